@@ -1,0 +1,1 @@
+"""View encoders, policies, rollouts and the training of the small agent."""

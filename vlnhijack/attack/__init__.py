@@ -1,0 +1,1 @@
+"""The texture attack: objective, projected Adam, optimisation."""

@@ -1,0 +1,1 @@
+"""Rollouts in attacked houses, records and tables."""

@@ -1,0 +1,1 @@
+"""Experiment files, their stages and the runner."""

@@ -1,0 +1,1 @@
+"""Navigation graphs, episodes, candidates and path metrics."""

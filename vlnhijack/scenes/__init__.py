@@ -1,0 +1,1 @@
+"""Houses: surfaces, objects, files, and the procedural generator."""

@@ -1,0 +1,1 @@
+"""Procedural houses: floor plans, furniture, materials, episodes; deterministic by seed."""
