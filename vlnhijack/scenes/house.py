@@ -1,0 +1,93 @@
+"""A house: surfaces, objects, rooms, lights and a navigation graph."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vlnhijack.errors import InputError
+from vlnhijack.navigation.graph import NavigationGraph
+from vlnhijack.scenes.surface import Surface
+
+
+@dataclass(frozen=True)
+class HouseObject:
+    """An attackable piece of furniture: one surface whose `object_id` is this id."""
+
+    id: str
+    category: str
+    room: str
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Room:
+    """A rectangular room: label such as "kitchen", and (x0, y0, x1, y1) in metres."""
+
+    id: str
+    label: str
+    bounds: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Light:
+    """A one-sided rectangular emitter of a lit house.
+
+    centre (metres), the two half-edge vectors whose cross product is the emitting direction, and
+    linear RGB radiance.
+    """
+
+    centre: tuple[float, float, float]
+    half_u: tuple[float, float, float]
+    half_v: tuple[float, float, float]
+    radiance: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class House:
+    """A house as it lies on disk.
+
+    kind "baked": textures are display values, shown as they are; kind "lit": textures are
+    sRGB-encoded albedo, lit by `lights`, displayed as encode(clip(exposure · radiance)).
+    """
+
+    name: str
+    kind: Literal["baked", "lit"]
+    surfaces: tuple[Surface, ...]
+    objects: tuple[HouseObject, ...]
+    rooms: tuple[Room, ...]
+    graph: NavigationGraph
+    lights: tuple[Light, ...] = ()
+    exposure: float = 1.0
+
+    @cached_property
+    def _by_id(self) -> dict[str, tuple[HouseObject, Surface]]:
+        surfaces = {s.object_id: s for s in self.surfaces if s.object_id is not None}
+        return {o.id: (o, surfaces[o.id]) for o in self.objects}
+
+    def object(self, object_id: str) -> HouseObject:
+        """The object of that id; InputError where the house has none."""
+        return self._lookup(object_id)[0]
+
+    def surface(self, object_id: str) -> Surface:
+        """The surface of an object; InputError where the house has no such object."""
+        return self._lookup(object_id)[1]
+
+    def with_texture(self, object_id: str, texture: NDArray[np.float32]) -> "House":
+        """The house with another texture (H,W,3) on one object."""
+        changed = self.surface(object_id).with_texture(texture)
+        surfaces = tuple(changed if s.object_id == object_id else s for s in self.surfaces)
+        return replace(self, surfaces=surfaces)
+
+    def _lookup(self, object_id: str) -> tuple[HouseObject, Surface]:
+        if object_id not in self._by_id:
+            raise InputError(
+                file=self.name,
+                field="object",
+                expected=f"one of {', '.join(sorted(self._by_id))}",
+                received=object_id,
+            )
+        return self._by_id[object_id]
