@@ -4,7 +4,8 @@ Matches VLN-HAMT's `finetune_src/models/vilmodel_cmt.py` (R2R and RxR variants);
 those of its checkpoints without their `vln_bert.` or `bert.` prefix.
 """
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple, cast
 
 import torch
 import torch.nn.functional as F
@@ -93,7 +94,7 @@ class HistoryEmbeddings(nn.Module):
         self.layer_norm = nn.LayerNorm(size, eps=_VISUAL_EPS)
         self.dropout = nn.Dropout(config.hidden_dropout)
 
-    def cls(self, batch: int) -> Tensor:
+    def first(self, batch: int) -> Tensor:
         token = self.layer_norm(self.cls_token[:, 0] + self.type_embedding.weight)
         return self.dropout(token.expand(batch, -1))
 
@@ -153,11 +154,11 @@ class Hamt(nn.Module):
             text = layer(text, scores)
         if not self.config.no_lang_ca:
             return text
-        updates = (layer.update_text(text, scores) for layer in self.encoder.x_layers)
-        return (text, *updates)
+        layers = cast(Iterable[CrossLayer], self.encoder.x_layers)
+        return (text, *(layer.update_text(text, scores) for layer in layers))
 
     def history_cls(self, batch: int) -> Tensor:
-        return self.hist_embeddings.cls(batch)
+        return self.hist_embeddings.first(batch)
 
     def encode_history(
         self, image: Tensor, angle: Tensor, pano_image: Tensor, pano_angle: Tensor, step: Tensor

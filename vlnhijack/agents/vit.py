@@ -1,0 +1,130 @@
+"""Vision transformer (Dosovitskiy et al., ICLR 2021) with timm's parameter names."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from vlnhijack.errors import InputError
+
+_EPS = 1e-6
+ALL = slice(None)
+CLS = slice(0, 1)
+
+
+@dataclass(frozen=True)
+class VitConfig:
+    """Defaults are those of ViT-B/16. `image_size` is (height, width) in pixels."""
+
+    image_size: tuple[int, int] = (224, 224)
+    patch: int = 16
+    dim: int = 768
+    depth: int = 12
+    heads: int = 12
+    mlp_ratio: float = 4.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "image_size", tuple(self.image_size))
+        if any(side % self.patch for side in self.image_size):
+            expected = f"multiples of the patch size {self.patch}"
+            raise InputError(field="image_size", expected=expected, received=self.image_size)
+        if self.dim % self.heads:
+            expected = f"a multiple of heads ({self.heads})"
+            raise InputError(field="dim", expected=expected, received=self.dim)
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Rows and columns of patches."""
+        return self.image_size[0] // self.patch, self.image_size[1] // self.patch
+
+    def to_mapping(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+class PatchEmbed(nn.Module):
+    def __init__(self, config: VitConfig) -> None:
+        super().__init__()
+        self.proj = nn.Conv2d(3, config.dim, config.patch, config.patch)
+
+    def forward(self, images: Tensor) -> Tensor:
+        return self.proj(images).flatten(2).transpose(1, 2)
+
+
+class Attention(nn.Module):
+    def __init__(self, config: VitConfig) -> None:
+        super().__init__()
+        self.heads = config.heads
+        self.qkv = nn.Linear(config.dim, 3 * config.dim)
+        self.proj = nn.Linear(config.dim, config.dim)
+
+    def forward(self, tokens: Tensor, rows: slice) -> Tensor:
+        packed = self.qkv(tokens).unflatten(-1, (3, self.heads, -1))
+        query, key, value = packed.permute(2, 0, 3, 1, 4)
+        mixed = F.scaled_dot_product_attention(query[:, :, rows], key, value)
+        return self.proj(mixed.transpose(1, 2).flatten(2))
+
+
+class Mlp(nn.Module):
+    def __init__(self, config: VitConfig) -> None:
+        super().__init__()
+        hidden = int(config.dim * config.mlp_ratio)
+        self.fc1 = nn.Linear(config.dim, hidden)
+        self.fc2 = nn.Linear(hidden, config.dim)
+
+    def forward(self, tokens: Tensor) -> Tensor:
+        return self.fc2(F.gelu(self.fc1(tokens)))
+
+
+class Block(nn.Module):
+    """Pre-norm transformer block; only the given rows of the result are computed."""
+
+    def __init__(self, config: VitConfig) -> None:
+        super().__init__()
+        self.norm1 = nn.LayerNorm(config.dim, eps=_EPS)
+        self.attn = Attention(config)
+        self.norm2 = nn.LayerNorm(config.dim, eps=_EPS)
+        self.mlp = Mlp(config)
+
+    def forward(self, tokens: Tensor, rows: slice = ALL) -> Tensor:
+        attended = tokens[:, rows] + self.attn(self.norm1(tokens), rows)
+        return attended + self.mlp(self.norm2(attended))
+
+
+class VisionTransformer(nn.Module):
+    """Images (V,3,H,W), already normalised, to the normalised CLS token (V,D)."""
+
+    def __init__(self, config: VitConfig) -> None:
+        super().__init__()
+        self.config = config
+        rows, columns = config.grid
+        self.cls_token = nn.Parameter(torch.zeros(1, 1, config.dim))
+        self.pos_embed = nn.Parameter(torch.zeros(1, 1 + rows * columns, config.dim))
+        self.patch_embed = PatchEmbed(config)
+        self.blocks = nn.ModuleList(Block(config) for _ in range(config.depth))
+        self.norm = nn.LayerNorm(config.dim, eps=_EPS)
+        nn.init.trunc_normal_(self.pos_embed, std=0.02)
+        self.apply(_initialise)
+
+    def forward(self, images: Tensor) -> Tensor:
+        return self._encode(images, CLS)[:, 0]
+
+    def forward_tokens(self, images: Tensor) -> Tensor:
+        """Every normalised token, (V,1+P,D): CLS, then the patches row by row."""
+        return self._encode(images, ALL)
+
+    def _encode(self, images: Tensor, rows: slice) -> Tensor:
+        patches = self.patch_embed(images)
+        cls = self.cls_token.expand(len(images), -1, -1)
+        tokens = torch.cat([cls, patches], 1) + self.pos_embed
+        last = len(self.blocks) - 1
+        for index, block in enumerate(self.blocks):
+            tokens = block(tokens, rows if index == last else ALL)
+        return self.norm(tokens)
+
+
+def _initialise(module: nn.Module) -> None:
+    if isinstance(module, nn.Linear):
+        nn.init.trunc_normal_(module.weight, std=0.02)
+        nn.init.zeros_(module.bias)
