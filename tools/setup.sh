@@ -68,9 +68,9 @@ if ! "$venv/bin/python" -m pip --version >/dev/null 2>&1; then
     "$python" -m venv --clear "$venv" || die "cannot create $venv (Debian: apt-get install python3-venv)"
 fi
 ensure_llvm
-say "installing vlnhijack and what it needs"
+say "installing vlnhijack and what it needs (a few minutes)"
 # shellcheck disable=SC2046
-"$venv/bin/python" -m pip install --quiet $(torch_index) -c constraints.txt -e '.[dev,notebooks]' \
+"$venv/bin/python" -m pip install -qq $(torch_index) -c constraints.txt -e '.[dev,notebooks]' \
     || die "pip failed; see its message above"
 "$venv/bin/python" -m vlnhijack.rendering.probe llvm_ad_rgb \
     || die "Mitsuba does not render here; $venv/bin/vlnhijack doctor says more"

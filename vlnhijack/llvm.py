@@ -44,10 +44,11 @@ class Llvm:
 
 
 def require_llvm() -> Llvm:
-    """The LLVM that Dr.Jit will load; sets DRJIT_LIBLLVM_PATH, so call it before importing drjit.
+    """The LLVM that Dr.Jit will load; call it before mitsuba or drjit is imported.
 
-    A path that the user has set there is kept. Raises SetupError, with the fix, where the library
-    is missing or older than 16.
+    Importing them loads the library, so DRJIT_LIBLLVM_PATH, set here, has no effect later. A path
+    that the user has set there is kept. Raises SetupError, with the fix, where the library is
+    missing or older than 16.
     """
     chosen = os.environ.get(VARIABLE)
     if chosen and not Path(chosen).is_file():

@@ -5,9 +5,13 @@ Run as a process of its own, because a variant that does not work may abort its 
 
 import sys
 
+from vlnhijack.llvm import require_llvm
+
 
 def probe(variant: str) -> None:
     """Renders four pixels of a lit scene with a path tracer; any failure is an exception."""
+    if variant.startswith("llvm"):
+        require_llvm()
     import mitsuba as mi
 
     mi.set_variant(variant)
