@@ -57,8 +57,8 @@ def require_llvm() -> Llvm:
     best = max(found, key=lambda llvm: llvm.version, default=None)
     if best is None or best.version < MINIMUM:
         seen = ", ".join(sorted({f"{llvm.version or 'an old one'}" for llvm in found})) or "none"
-        where = f" at {VARIABLE}={chosen}" if chosen else ""
-        raise SetupError(f"needs libLLVM >= {MINIMUM}, found {seen}{where}; fix: {FIX}")
+        where, fix = (f" at {VARIABLE}={chosen}", f"unset it, or: {FIX}") if chosen else ("", FIX)
+        raise SetupError(f"needs libLLVM >= {MINIMUM}, found {seen}{where}; fix: {fix}")
     os.environ[VARIABLE] = str(best.path)
     return best
 
