@@ -1,0 +1,112 @@
+"""Candidates, angles and metrics against MatterSim's and HAMT's own output."""
+
+import gzip
+import json
+import os
+import tarfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vlnhijack.errors import InputError
+from vlnhijack.navigation.candidates import candidates
+from vlnhijack.navigation.graph import NavigationGraph, load_graph
+from vlnhijack.navigation.metrics import path_metrics
+from vlnhijack.navigation.views import VIEWS, angle_features, view_angles
+
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+REFERENCE = Path(os.environ.get("VLNHIJACK_REFERENCE", SHARED / "reference")) / "mattersim"
+DATA = Path(os.environ.get("VLNHIJACK_DATA", SHARED / "data")) / "r2r" / "connectivity.tar.gz"
+NAMES = {
+    "nav_error": "navigation_error",
+    "oracle_error": "oracle_error",
+    "trajectory_lengths": "path_length",
+    "success": "success",
+    "spl": "spl",
+    "oracle_success": "oracle_success",
+    "DTW": "dtw",
+    "nDTW": "ndtw",
+    "SDTW": "sdtw",
+    "CLS": "cls",
+}
+
+pytestmark = pytest.mark.skipif(
+    not REFERENCE.is_dir(), reason=f"no reference data at {REFERENCE} (VLNHIJACK_REFERENCE)"
+)
+
+
+def read(name: str) -> Any:
+    with gzip.open(REFERENCE / name, "rt") as file:
+        return json.load(file)
+
+
+@pytest.fixture(scope="module")
+def connectivity(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if not DATA.is_file():
+        pytest.skip(f"no connectivity graphs at {DATA} (VLNHIJACK_DATA)")
+    folder = tmp_path_factory.mktemp("r2r")
+    with tarfile.open(DATA) as archive:
+        archive.extractall(folder, filter="data")
+    return next(folder.rglob("*_connectivity.json")).parent
+
+
+def test_views_have_the_simulator_s_angles() -> None:
+    views = json.loads((REFERENCE / "views.json").read_text())
+    assert len(views) == VIEWS
+    for view in views:
+        expected = (view["heading"], view["elevation"])
+        assert view_angles(view["pointId"]) == pytest.approx(expected, abs=1e-15)
+
+
+def test_angle_features_are_bit_exact() -> None:
+    with np.load(REFERENCE / "angles.npz") as angles:
+        reference = angles["angle_feature"]
+    ours = np.stack([angle_features(base) for base in range(VIEWS)])
+    assert np.array_equal(ours, reference)
+
+
+def test_candidates_match(connectivity: Path) -> None:
+    for scan, viewpoints in read("candidates.json.gz").items():
+        ours = candidates(load_graph(connectivity, scan))
+        assert set(viewpoints) <= set(ours)
+        for viewpoint, expected in viewpoints.items():
+            found = ours[viewpoint]
+            where = f"{scan} {viewpoint}"
+            assert [(c.viewpoint, c.point_id) for c in found] == [
+                (e["viewpointId"], e["pointId"]) for e in expected
+            ], where
+            for field, name in (
+                ("heading", "normalized_heading"),
+                ("elevation", "elevation"),
+                ("distance", "distance"),
+            ):
+                got = np.array([getattr(c, field) for c in found])
+                want = np.array([e[name] for e in expected])
+                assert np.array_equal(got, want), f"{where} {field}"
+
+
+def check_scores(graph: NavigationGraph, record: dict[str, Any]) -> None:
+    scores = path_metrics(graph, record["prediction"], record["reference"])
+    for theirs, ours in NAMES.items():
+        want = float(record["scores"][theirs])
+        got = getattr(scores, ours)
+        assert got == pytest.approx(want, abs=1e-9, nan_ok=True), (record["kind"], ours)
+
+
+def test_metrics_match(connectivity: Path) -> None:
+    records = read("metrics.json.gz")
+    graphs = {scan: load_graph(connectivity, scan) for scan in {r["scan"] for r in records}}
+    for record in records:
+        check_scores(graphs[record["scan"]], record)
+
+
+def test_metrics_at_the_edges_match_or_explain() -> None:
+    for record in read("metrics_edge.json.gz"):
+        graph = load_graph(REFERENCE, record["scan"])
+        if "error" in record:
+            with pytest.raises(InputError, match=record["scan"]):
+                path_metrics(graph, record["prediction"], record["reference"])
+        else:
+            check_scores(graph, record)
