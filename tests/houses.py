@@ -36,7 +36,7 @@ def tiny_house(kind: Literal["baked", "lit"] = "baked") -> House:
         rooms=(Room("room_0", "living room", (-2.5, -2.5, 2.5, 2.5)),),
         graph=_graph(f"tiny_{kind}"),
         lights=(light,) if kind == "lit" else (),
-        exposure=0.8 if kind == "lit" else 1.0,
+        exposure=2.0 if kind == "lit" else 1.0,
     )
 
 
@@ -46,7 +46,7 @@ def _box(centre: tuple[float, float, float], size: tuple[float, float, float]) -
 
 def _surface(name: str, mesh: trimesh.Trimesh, object_id: str | None, size: int) -> Surface:
     atlas = unwrap(mesh.vertices, mesh.faces, size)
-    vertices = mesh.vertices[atlas.source].astype(np.float32)
+    vertices = np.asarray(mesh.vertices, np.float32)[atlas.source]
     return Surface(name, vertices, atlas.faces, atlas.uv, _texture(name, size), object_id)
 
 

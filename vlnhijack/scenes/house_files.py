@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from vlnhijack import display
@@ -123,7 +123,7 @@ def read_texture(path: Path) -> NDArray[np.float32]:
                 received = f"{image.format} {image.mode}"
                 raise InputError(file=path, expected="an 8-bit RGB PNG", received=received)
             return display.from_8bit(np.asarray(image))
-    except (OSError, SyntaxError, ValueError, UnidentifiedImageError) as error:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise InputError(file=path, expected="an 8-bit RGB PNG", received=error) from None
 
 
