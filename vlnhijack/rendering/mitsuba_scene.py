@@ -1,0 +1,112 @@
+"""A Mitsuba scene in memory, built once from a house."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vlnhijack import display
+from vlnhijack.rendering.variant import activate
+from vlnhijack.scenes.house import House, Light
+from vlnhijack.scenes.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class MitsubaScene:
+    """A loaded scene and the index into `house.surfaces` of each of Mitsuba's shapes.
+
+    surface_of_shape is indexed by shape pointer (see `surface_index`); -1 stands for a light.
+    """
+
+    scene: Any
+    surface_of_shape: Any
+
+    def surface_index(self, interaction: Any) -> Any:
+        """Dr.Jit Int of the surface that was hit, -1 where none was."""
+        mi = activate()
+        import drjit as dr
+
+        pointer = dr.reinterpret_array(mi.UInt32, interaction.shape)
+        return dr.gather(mi.Int32, self.surface_of_shape, pointer)
+
+
+def build_scene(house: House) -> MitsubaScene:
+    """The scene of a house: baked surfaces glow as they look, lit ones are diffuse.
+
+    Baked textures are `raw` radiance. Lit textures are handed over as linear albedo, because
+    Mitsuba decodes sRGB only when it reads a file.
+    """
+    mi = activate()
+    content: dict[str, Any] = {"type": "scene"}
+    for index, surface in enumerate(house.surfaces):
+        content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind)
+    for index, light in enumerate(house.lights if house.kind == "lit" else ()):
+        content[f"light_{index}"] = _light(light)
+    scene = mi.load_dict(content)
+    return MitsubaScene(scene, _surface_of_shape(scene))
+
+
+def texture_key(house: House, object_id: str) -> str:
+    """The scene parameter that holds an object's texture."""
+    index = next(i for i, s in enumerate(house.surfaces) if s is house.surface(object_id))
+    plugin = "emitter.radiance" if house.kind == "baked" else "bsdf.reflectance"
+    return f"surface_{index}.{plugin}.data"
+
+
+def bitmap(texture: NDArray[np.float32]) -> dict[str, Any]:
+    """A differentiable float texture, bilinear and clamped at its border."""
+    return {
+        "type": "bitmap",
+        "data": activate().TensorXf(np.ascontiguousarray(texture, np.float32)),
+        "format": "variant",
+        "raw": True,
+        "filter_type": "bilinear",
+        "wrap_mode": "clamp",
+    }
+
+
+def _mesh(name: str, surface: Surface, kind: str) -> Any:
+    mi = activate()
+    props = mi.Properties()
+    if kind == "baked":
+        props["emitter"] = mi.load_dict({"type": "area", "radiance": bitmap(surface.texture)})
+        props["bsdf"] = mi.load_dict(
+            {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0}}
+        )
+    else:
+        albedo = bitmap(display.decode(surface.texture))
+        props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": albedo})
+    mesh = mi.Mesh(
+        name, len(surface.vertices), len(surface.faces), has_vertex_texcoords=True, props=props
+    )
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = surface.vertices.ravel()
+    params["faces"] = surface.faces.astype(np.uint32).ravel()
+    params["vertex_texcoords"] = surface.uv.ravel()
+    params.update()
+    return mesh
+
+
+def _light(light: Light) -> dict[str, Any]:
+    to_world = np.eye(4)
+    to_world[:3, 0], to_world[:3, 1], to_world[:3, 3] = light.half_u, light.half_v, light.centre
+    normal = np.cross(light.half_u, light.half_v)
+    to_world[:3, 2] = normal / np.linalg.norm(normal)
+    return {
+        "type": "rectangle",
+        "to_world": activate().ScalarTransform4f(to_world),
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(light.radiance)}},
+    }
+
+
+def _surface_of_shape(scene: Any) -> Any:
+    mi = activate()
+    import drjit as dr
+
+    pointers = np.array(dr.reinterpret_array(mi.UInt32, scene.shapes_dr()))
+    table = np.full(pointers.max() + 1, -1, np.int32)
+    for pointer, shape in zip(pointers, scene.shapes(), strict=True):
+        prefix, _, index = shape.id().partition("_")
+        table[pointer] = int(index) if prefix == "surface" else -1
+    return mi.Int32(table)

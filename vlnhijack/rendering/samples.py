@@ -1,0 +1,139 @@
+"""Camera rays: the one place that draws them.
+
+Many cameras of one image size are one Mitsuba sensor whose film stacks the views from top to
+bottom, so that all of them render in one wavefront. `camera_rays` draws with the `sample_rays` of
+Mitsuba's own integrators: `mi.render` with the same sensor, seed and spp uses the same rays.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from vlnhijack.errors import InputError
+from vlnhijack.frames import Camera, camera_to_world
+from vlnhijack.rendering.variant import activate
+
+SAMPLER = "stratified"
+RAYS_AT_ONCE = 1 << 22
+_FAR = 1e4
+
+
+def check_cameras(cameras: Sequence[Camera]) -> None:
+    """Raises InputError unless there is at least one camera and all have one image size."""
+    sizes = {(camera.width, camera.height) for camera in cameras}
+    if len(sizes) != 1:
+        raise InputError(
+            field="cameras", expected="one or more of one image size", received=sorted(sizes)
+        )
+
+
+def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
+    """A Mitsuba sensor of V cameras: film (V·height, width), box filter, float32.
+
+    `sensor.aim(cameras)` points it at as many other cameras of the same size.
+    """
+    check_cameras(cameras)
+    mi = activate()
+    _register()
+    film = {
+        "type": "hdrfilm",
+        "width": cameras[0].width,
+        "height": cameras[0].height * len(cameras),
+        "rfilter": {"type": "box"},
+        "pixel_format": "rgb",
+        "component_format": "float32",
+        "sample_border": False,
+    }
+    sampler = {"type": SAMPLER, "sample_count": spp}
+    sensor = mi.load_dict({"type": "vlnhijack_views", "film": film, "sampler": sampler})
+    sensor.aim(cameras)
+    return sensor
+
+
+def camera_rays(sensor: Any, seed: int, spp: int) -> tuple[Any, Any]:
+    """Rays in film order, `spp` after another for each pixel, and the sampler that drew them.
+
+    They are those of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator).
+    """
+    integrator = _ray_source()
+    sampler, drawn = integrator.prepare(sensor, seed, spp)
+    if drawn != spp:
+        raise InputError(field="spp", expected=f"{drawn} or another count", received=spp)
+    ray, _, _ = integrator.sample_rays(sensor=sensor, scene=None, sampler=sampler)
+    return ray, sampler
+
+
+def centre_rays(sensor: Any) -> Any:
+    """One ray through the centre of each pixel, in film order."""
+    mi = activate()
+    import drjit as dr
+
+    width, height = sensor.film().size()
+    index = dr.arange(mi.UInt32, int(width * height))
+    position = mi.Point2f(index % width, index // width) + 0.5
+    ray, _ = sensor.sample_ray_differential(0.0, 0.0, position / mi.Point2f(width, height), 0.0)
+    return ray
+
+
+def chunks(cameras: Sequence[Camera], spp: int) -> Iterator[tuple[int, list[Camera]]]:
+    """(first index, cameras) of equally long runs of at most RAYS_AT_ONCE rays.
+
+    The last run is filled up with its last camera, so that one compiled kernel serves all.
+    """
+    check_cameras(cameras)
+    rays = cameras[0].width * cameras[0].height * spp
+    length = min(max(1, RAYS_AT_ONCE // rays), len(cameras))
+    for first in range(0, len(cameras), length):
+        run = list(cameras[first : first + length])
+        yield first, run + [run[-1]] * (length - len(run))
+
+
+@cache
+def _ray_source() -> Any:
+    return activate().load_dict({"type": "prb", "max_depth": 1})
+
+
+@cache
+def _register() -> None:
+    mi = activate()
+    import drjit as dr
+
+    class Views(mi.Sensor):  # type: ignore[misc]
+        """Pinhole cameras of one size, stacked from top to bottom."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.m_needs_sample_3 = False
+
+        def aim(self, cameras: Sequence[Camera]) -> None:
+            poses = np.stack([camera_to_world(camera)[:3].T for camera in cameras])
+            half_height = np.tan([camera.vertical_fov / 2 for camera in cameras])
+            aspect = np.array([camera.width / camera.height for camera in cameras])
+            self.count = dr.opaque(mi.UInt32, len(cameras))
+            self.poses = mi.Float(poses.ravel().astype(np.float32))
+            self.half_height = mi.Float(half_height.astype(np.float32))
+            self.half_width = mi.Float((half_height * aspect).astype(np.float32))
+
+        def sample_ray_differential(
+            self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True
+        ) -> tuple[Any, Any]:
+            row = sample2.y * mi.Float(self.count)
+            view = dr.minimum(mi.UInt32(row), self.count - 1)
+            x = (1 - 2 * sample2.x) * dr.gather(mi.Float, self.half_width, view)
+            y = (1 - 2 * (row - view)) * dr.gather(mi.Float, self.half_height, view)
+            left, up, forward, position = (
+                dr.gather(mi.Vector3f, self.poses, 4 * view + axis) for axis in range(4)
+            )
+            ray = dr.zeros(mi.RayDifferential3f)
+            ray.o = mi.Point3f(position)
+            ray.d = dr.normalize(x * left + y * up + forward)
+            ray.maxt = mi.Float(_FAR)
+            ray.time = time
+            return ray, mi.Spectrum(1)
+
+        def to_string(self) -> str:
+            return f"Views[{self.film().size()}]"
+
+    mi.register_sensor("vlnhijack_views", Views)
