@@ -11,8 +11,8 @@ from vlnhijack.scenes.procedural.phrases import GRAMMAR, object_word, phrase, ro
 
 MOST_WORDS, FEWEST_WORDS, MOST_CLAUSES = 35, 8, 4
 KEPT = {
-    "around": 0.5, "turn": 0.35, "straight": 0.15, "away": 0.3, "leave": 0.55, "enter": 0.55,
-    "cross": 0.3, "door": 0.25, "pass": 0.5, "between": 0.4, "toward": 0.5,
+    "around": 0.5, "turn": 0.35, "straight": 0.15, "away": 0.3, "leave": 0.6, "enter": 0.65,
+    "cross": 0.4, "door": 0.2, "pass": 0.6, "between": 0.5, "toward": 0.6,
 }  # fmt: skip
 OTHER_SIDE = {"left": "right", "right": "left", "": ""}
 
@@ -123,10 +123,10 @@ def _stop_clause(
     if len(stop.objects) == 2:
         return phrase("stop_pair", slots, rng)
     draw = rng.random()
-    if draw < 0.3 and stop.room:
+    if draw < 0.45 and stop.room:
         return phrase("stop_room", slots, rng)
     there, before = (landmarks.sightings[v].get(stop.objects[0]) for v in (path[-1], path[-2]))
-    if draw < 0.5 and there and before and there.distance < before.distance:
+    if draw < 0.62 and there and before and there.distance < before.distance:
         return phrase("stop_there", slots, rng)
     return phrase("stop", slots, rng)
 
