@@ -1,20 +1,31 @@
-"""Painted images as materials on the plane of local x (to the right as seen from +y: -x) and z."""
+"""Painted images as materials in the plane of x and z, seen from +y."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vlnhijack.scenes.procedural.materials import FABRICS, PAINTS, Material, mix, pick
+from vlnhijack.scenes.procedural.materials import FABRICS, FLOWERS, PAINTS, Material, mix, pick
 from vlnhijack.scenes.procedural.noise import fractal, noise
 
 Array = NDArray[np.float64]
+Drawing = Callable[[Array], Array]
 
 
 def painting(
     rng: np.random.Generator, width: float, height: float, bottom: float = 0.0
 ) -> Material:
-    """A landscape, seascape, flowers or an abstract, from x = ±width/2 and z = bottom upwards."""
-    draw = [_landscape, _sea, _blocks, _flowers, _rings][rng.integers(5)](rng)
+    """A landscape, seascape, flowers or an abstract on |x| ≤ width/2, z from `bottom` upwards."""
+    makers = [_landscape, _sea, _blocks, _flowers, _rings]
+    return _framed(makers[rng.integers(5)](rng), width, height, bottom)
 
+
+def view(rng: np.random.Generator, width: float, height: float, bottom: float) -> Material:
+    """A landscape or seascape, as televisions show it."""
+    return _framed([_landscape, _sea][rng.integers(2)](rng), width, height, bottom)
+
+
+def _framed(draw: Drawing, width: float, height: float, bottom: float) -> Material:
     def evaluate(points: Array, normals: Array) -> Array:
         u = 0.5 - points[:, 0] / width
         v = (points[:, 2] - bottom) / height
@@ -23,7 +34,7 @@ def painting(
     return evaluate
 
 
-def _landscape(rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _landscape(rng: np.random.Generator) -> Drawing:
     sky, low = (
         pick(rng, [(0.35, 0.6, 0.86), (0.9, 0.55, 0.3), (0.6, 0.72, 0.85)]),
         (0.92, 0.86, 0.7),
@@ -43,7 +54,7 @@ def _landscape(rng: np.random.Generator):  # type: ignore[no-untyped-def]
     return draw
 
 
-def _sea(rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _sea(rng: np.random.Generator) -> Drawing:
     seed, sail = int(rng.integers(2**31)), rng.uniform(0.3, 0.7)
 
     def draw(p: Array) -> Array:
@@ -59,7 +70,7 @@ def _sea(rng: np.random.Generator):  # type: ignore[no-untyped-def]
     return draw
 
 
-def _blocks(rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _blocks(rng: np.random.Generator) -> Drawing:
     columns, rows = np.sort(rng.uniform(0.1, 0.9, 3)), np.sort(rng.uniform(0.1, 0.9, 3))
     colours = np.array([pick(rng, FABRICS + PAINTS + ((0.9, 0.9, 0.86),) * 6) for _ in range(16)])
 
@@ -74,9 +85,9 @@ def _blocks(rng: np.random.Generator):  # type: ignore[no-untyped-def]
     return draw
 
 
-def _flowers(rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _flowers(rng: np.random.Generator) -> Drawing:
     centres = rng.uniform((0.2, 0.45), (0.8, 0.85), (9, 2))
-    colours = [pick(rng, FABRICS, 0.1) for _ in centres]
+    colours = [pick(rng, FLOWERS) for _ in centres]
     ground, vase = pick(rng, PAINTS), pick(rng, FABRICS)
 
     def draw(p: Array) -> Array:
@@ -97,7 +108,7 @@ def _flowers(rng: np.random.Generator):  # type: ignore[no-untyped-def]
     return draw
 
 
-def _rings(rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _rings(rng: np.random.Generator) -> Drawing:
     ground = pick(rng, PAINTS)
     discs = [(rng.random(2), rng.uniform(0.1, 0.35), pick(rng, FABRICS, 0.1)) for _ in range(7)]
 

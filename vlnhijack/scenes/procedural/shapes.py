@@ -54,14 +54,20 @@ def join(meshes: Iterable[Mesh]) -> Mesh:
     )
 
 
-def loft(rings: ArrayLike) -> Mesh:
-    """The closed skin over rings (M,K,3), capped by fans; each ring counter-clockwise seen from
-    the side of the last ring."""
+def loft(rings: ArrayLike, cyclic: bool = False) -> Mesh:
+    """The closed skin over rings (M,K,3): capped by fans or, if cyclic, from the last to the first.
+
+    Each ring is counter-clockwise seen from the side of the last ring; of a cyclic skin the outer
+    ones go up and the inner ones down.
+    """
     r = np.asarray(rings, float)
     m, k, _ = r.shape
-    i, j = np.meshgrid(np.arange(m - 1) * k, np.arange(k), indexing="ij")
+    i, j = np.meshgrid(np.arange(m if cyclic else m - 1) * k, np.arange(k), indexing="ij")
     a, b = i + j, i + (j + 1) % k
-    sides = np.stack([a, b, b + k, a, b + k, a + k], axis=-1).reshape(-1, 3)
+    c, d = (b + k) % (m * k), (a + k) % (m * k)
+    sides = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    if cyclic:
+        return Mesh(r.reshape(-1, 3), sides)
     fan = np.stack([np.zeros(k - 2, int), np.arange(1, k - 1), np.arange(2, k)], axis=-1)
     return Mesh(r.reshape(-1, 3), np.concatenate([sides, fan[:, ::-1], fan + (m - 1) * k]))
 

@@ -9,8 +9,10 @@ from vlnhijack.scenes.procedural.materials import (
     WOODS,
     Colour,
     Material,
+    legal,
     mix,
     pick,
+    seed_from,
     shade,
 )
 from vlnhijack.scenes.procedural.noise import fractal, hashed, noise
@@ -23,14 +25,6 @@ WALLS: tuple[Colour, ...] = (
 )  # fmt: skip
 
 
-def _seed(rng: np.random.Generator) -> int:
-    return int(rng.integers(2**31))
-
-
-def _legal(colours: Array) -> Array:
-    return np.clip(colours, 0.04, 0.93)
-
-
 def _unrolled(points: Array) -> Array:
     """(K,2) coordinates along and up axis-aligned walls."""
     return np.stack([points[:, 0] + points[:, 1], points[:, 2]], axis=-1)
@@ -38,17 +32,17 @@ def _unrolled(points: Array) -> Array:
 
 def plaster(rng: np.random.Generator, colour: Colour | None = None) -> Material:
     """Painted plaster with faint stains."""
-    base, seed = colour or pick(rng, WALLS, 0.04), _seed(rng)
+    base, seed = np.array(colour or pick(rng, WALLS, 0.04)), seed_from(rng)
 
     def evaluate(points: Array, normals: Array) -> Array:
-        return _legal(base * (0.94 + 0.1 * fractal(points, 0.8, seed, 4))[:, None])
+        return legal(base * (0.94 + 0.1 * fractal(points, 0.8, seed, 4))[:, None])
 
     return evaluate
 
 
 def wallpaper(rng: np.random.Generator, colour: Colour | None = None) -> Material:
     """Stripes, lozenges or flowers on a light ground."""
-    base, seed = np.array(colour or pick(rng, WALLS, 0.05)), _seed(rng)
+    base, seed = np.array(colour or pick(rng, WALLS, 0.05)), seed_from(rng)
     other = mix(base, pick(rng, FABRICS), np.array([rng.uniform(0.3, 0.7)]))[0]
     kind, scale = rng.integers(3), rng.uniform(0.16, 0.35)
 
@@ -63,7 +57,7 @@ def wallpaper(rng: np.random.Generator, colour: Colour | None = None) -> Materia
             x, y = np.mod(u + row / 2, 1) - 0.5, np.mod(v, 1) - 0.5
             petals = 0.22 + 0.1 * np.cos(5 * np.arctan2(y, x))
             amount = (np.hypot(x, y) < petals).astype(float)
-        return _legal(mix(base, other, amount) * (0.96 + 0.06 * noise(points, 0.3, seed))[:, None])
+        return legal(mix(base, other, amount) * (0.96 + 0.06 * noise(points, 0.3, seed))[:, None])
 
     return evaluate
 
@@ -76,14 +70,14 @@ def wainscot(rng: np.random.Generator, height: float = 0.9) -> Material:
         u, z = _unrolled(points).T
         groove = (np.mod(u, 0.2) < 0.02) | (np.abs(z - height) < 0.03) | (z < 0.1)
         boards = mix(lower, shade(lower, 0.7), groove * 1.0)
-        return _legal(np.where((z < height + 0.03)[:, None], boards, upper))
+        return legal(np.where((z < height + 0.03)[:, None], boards, upper))
 
     return evaluate
 
 
 def parquet(rng: np.random.Generator, colour: Colour | None = None) -> Material:
     """A floor of boards or of blocks in a basket weave, in the plane z = const."""
-    base, seed = colour or pick(rng, WOODS[:7], 0.03), _seed(rng)
+    base, seed = np.array(colour or pick(rng, WOODS[:7], 0.03)), seed_from(rng)
     width, blocks = rng.uniform(0.10, 0.18), rng.random() < 0.4
 
     def evaluate(points: Array, normals: Array) -> Array:
@@ -101,7 +95,7 @@ def parquet(rng: np.random.Generator, colour: Colour | None = None) -> Material:
         seam = (np.mod(y / width, 1) < 0.07) | (np.mod(along, 1) < 0.01)
         grain = noise(np.stack([x, y], axis=-1), np.array([0.5, 0.02]), seed + 1)
         tone = 0.75 + 0.3 * hashed(board, seed + 2) + 0.15 * grain
-        return _legal(base * (tone * np.where(seam, 0.6, 1.0))[:, None])
+        return legal(base * (tone * np.where(seam, 0.6, 1.0))[:, None])
 
     return evaluate
 
@@ -110,7 +104,7 @@ def tile(rng: np.random.Generator, colour: Colour | None = None, wall: bool = Fa
     """Square tiles with grout: plain, chequered or mottled; on walls or on a floor."""
     base = np.array(colour or pick(rng, WALLS + PAINTS, 0.05))
     other = np.array(pick(rng, PAINTS + FABRICS))
-    kind, seed = rng.integers(3), _seed(rng)
+    kind, seed = rng.integers(3), seed_from(rng)
     edge = rng.uniform(0.12, 0.2) if wall else rng.uniform(0.25, 0.45)
 
     def evaluate(points: Array, normals: Array) -> Array:
@@ -118,21 +112,21 @@ def tile(rng: np.random.Generator, colour: Colour | None = None, wall: bool = Fa
         cells, inside = np.floor(plane / edge).astype(np.int64), np.mod(plane / edge, 1)
         chequer = np.mod(cells.sum(axis=1), 2).astype(float)
         lively = hashed(cells, seed)
-        amount = [0.15 * lively, chequer, 0.6 * (lively > 0.8)][kind]
+        amount = (0.15 * lively, chequer, 0.6 * (lively > 0.8))[kind]
         colours = mix(base, other, amount) * (0.92 + 0.1 * lively)[:, None]
-        grout = (inside < 0.05).any(axis=1)
-        return _legal(np.where(grout[:, None], 0.62, colours))
+        grout = inside.min(axis=1, keepdims=True) < 0.05
+        return legal(np.where(grout, 0.62, colours))
 
     return evaluate
 
 
 def carpet(rng: np.random.Generator, colour: Colour | None = None) -> Material:
     """Wall-to-wall carpet: short pile in one colour."""
-    base, seed = colour or pick(rng, FABRICS, 0.05), _seed(rng)
+    base, seed = np.array(colour or pick(rng, FABRICS, 0.05)), seed_from(rng)
 
     def evaluate(points: Array, normals: Array) -> Array:
         pile = 0.8 + 0.2 * noise(points, 0.02, seed) + 0.15 * fractal(points, 0.5, seed + 2, 2)
-        return _legal(base * pile[:, None])
+        return legal(base * pile[:, None])
 
     return evaluate
 
@@ -140,7 +134,7 @@ def carpet(rng: np.random.Generator, colour: Colour | None = None) -> Material:
 def rug(rng: np.random.Generator, width: float, depth: float, disc: bool) -> Material:
     """A bordered rug centred at the origin: oriental, bands or rings."""
     colours = np.array([pick(rng, FABRICS) for _ in range(4)])
-    kind, seed, scale = rng.integers(3), _seed(rng), rng.uniform(0.25, 0.4)
+    kind, seed, scale = rng.integers(3), seed_from(rng), rng.uniform(0.25, 0.4)
 
     def evaluate(points: Array, normals: Array) -> Array:
         x, y = points[:, 0], points[:, 1]
@@ -158,6 +152,6 @@ def rug(rng: np.random.Generator, width: float, depth: float, disc: bool) -> Mat
         else:
             index = np.mod(np.floor(edge / (scale / 2.5)), 4).astype(int)
         index = np.where((edge > 0.06) & (edge < 0.16), 2, np.where(edge <= 0.06, 3, index))
-        return _legal(colours[index] * (0.85 + 0.2 * noise(points, 0.02, seed))[:, None])
+        return legal(colours[index] * (0.85 + 0.2 * noise(points, 0.02, seed))[:, None])
 
     return evaluate

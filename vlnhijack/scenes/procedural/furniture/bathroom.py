@@ -20,15 +20,10 @@ from vlnhijack.scenes.procedural.shapes import (
 )
 
 
-def _oval(width: float, depth: float, z: float, at: tuple[float, float] = (0.0, 0.0)) -> Mesh:
-    ring = circle(1.0, 0.0, 18)
-    return loft([ring, ring]).scaled(width / 2, depth / 2, 1.0).moved(at[0], at[1], z)
-
-
-def _ovals(sizes: list[tuple[float, float, float, float]]) -> Mesh:
-    """Rings of (width, depth, y, z), from the bottom up."""
+def _ovals(sizes: list[tuple[float, float, float, float]], cyclic: bool = False) -> Mesh:
+    """A skin over ovals of (width, depth, y, z), from the bottom up."""
     unit = circle(0.5, 0.0, 18)
-    return loft([unit * (w, d, 1.0) + np.array([0.0, y, z]) for w, d, y, z in sizes])
+    return loft([unit * (w, d, 1.0) + np.array([0.0, y, z]) for w, d, y, z in sizes], cyclic)
 
 
 def toilet(rng: np.random.Generator, large: bool) -> Piece:
@@ -52,8 +47,9 @@ def toilet(rng: np.random.Generator, large: bool) -> Piece:
             (0.4, 0.5, 0.07, 0.395),
             (0.4, 0.5, 0.07, 0.42),
             (0.26, 0.34, 0.08, 0.42),
-            (0.25, 0.33, 0.08, 0.36),
-        ]
+            (0.27, 0.35, 0.08, 0.395),
+        ],
+        cyclic=True,
     )
     lid = _ovals([(0.4, 0.48, 0.0, 0.0), (0.4, 0.48, 0.0, 0.02), (0.3, 0.38, 0.0, 0.028)])
     open_lid = lid.turned("x", np.pi / 2 + 0.15).moved(0.0, -0.12, 0.66)

@@ -48,7 +48,7 @@ def _frame(width: float, height: float, edge: float) -> Mesh:
     """A bevelled frame, its back at y = 0, its bottom at z = 0, hollow in front."""
     sizes = [(0.0, 0.0), (0.0, 0.02), (edge * 0.5, 0.035), (edge, 0.022), (edge, 0.008)]
     rings = [rectangle(width - 2 * f, height - 2 * f, y) for f, y in sizes]
-    return loft(rings).turned("x", -np.pi / 2).turned("z", np.pi).moved(0.0, 0.0, height / 2)
+    return loft(rings).turned("x", -np.pi / 2).moved(0.0, 0.0, height / 2)
 
 
 def picture(rng: np.random.Generator, large: bool) -> Piece:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from vlnhijack.scenes.procedural.art import painting
+from vlnhijack.scenes.procedural.art import view
 from vlnhijack.scenes.procedural.furniture.piece import Part, Piece, assemble
 from vlnhijack.scenes.procedural.furniture.seating import legs
-from vlnhijack.scenes.procedural.furniture.storage import door
+from vlnhijack.scenes.procedural.furniture.storage import door, gaps
 from vlnhijack.scenes.procedural.materials import (
     FABRICS,
     WOODS,
@@ -45,7 +45,7 @@ def tv_monitor(rng: np.random.Generator, large: bool) -> Piece:
 
 def _screen(rng: np.random.Generator, width: float, height: float, bottom: float) -> Material:
     """A dark screen with the sheen of a window, or a picture."""
-    picture, slope = painting(rng, width, height, bottom), rng.uniform(-0.5, 0.5)
+    picture, slope = view(rng, width, height, bottom), rng.uniform(-0.5, 0.5)
     off = rng.random() < 0.4
 
     def evaluate(points: Array, normals: Array) -> Array:
@@ -66,6 +66,7 @@ def _low_cabinet(rng: np.random.Generator, width: float, height: float) -> list[
     ]
     knobs = [box(0.12, 0.03, 0.015, (x * width / 3, 0.215, height - 0.08)) for x in (-1, 0, 1)]
     return [
+        gaps(width - 0.02, height - 0.14, 0.2, 0.12),
         Part(join([body, legs(width - 0.1, 0.36, 0.12, 0.05)]), wood(rng, colour, 0)),
         Part(join(doors), wood(rng, shade(colour, 1.12), 0)),
         Part(join(knobs), metal(rng)),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vlnhijack.scenes.procedural.furniture.piece import Part, Piece, assemble
-from vlnhijack.scenes.procedural.furniture.storage import door
+from vlnhijack.scenes.procedural.furniture.storage import door, gaps
 from vlnhijack.scenes.procedural.materials import (
     PAINTS,
     WOODS,
@@ -139,12 +139,13 @@ def _units(rng: np.random.Generator, width: float) -> tuple[list[Part], float]:
     fronts, grips = [], []
     for i in range(doors):
         x = -width / 2 + each * (i + 0.5)
-        fronts.append(door(each - 0.012, 0.55, (x, front - 0.012, 0.12)))
-        fronts.append(door(each - 0.012, 0.17, (x, front - 0.012, 0.685)))
+        fronts.append(door(each - 0.018, 0.55, (x, front - 0.012, 0.12)))
+        fronts.append(door(each - 0.018, 0.17, (x, front - 0.012, 0.685)))
         grips += [box(0.14, 0.035, 0.018, (x, front + 0.014, z)) for z in (0.62, 0.77)]
     body = box(width, 0.6, 0.79, (0.0, 0.0, 0.09))
     foot = box(width - 0.04, 0.5, 0.1, (0.0, -0.03, 0.0))
     parts = [
+        gaps(width - 0.01, 0.755, front, 0.11),
         Part(body, solid(colour)),
         Part(foot, solid((0.15, 0.14, 0.14))),
         Part(join(fronts), solid(colour)),

@@ -12,10 +12,14 @@ GOLDEN = np.pi * (3 - np.sqrt(5))
 def plant(rng: np.random.Generator, large: bool) -> Piece:
     """A potted plant; large: 1.5-1.9 m with a dense crown of broad leaves."""
     if large:
-        return _bush(rng) if rng.random() < 0.6 else _palm(rng, rng.uniform(1.6, 1.9), 14, 0.16)
+        return (
+            _bush(rng)
+            if rng.random() < 0.6
+            else _palm(rng, rng.uniform(0.9, 1.1), rng.uniform(0.65, 0.8))
+        )
     kind = rng.integers(3)
     if kind == 0:
-        return _palm(rng, rng.uniform(0.7, 1.1), 10, 0.1)
+        return _palm(rng, rng.uniform(0.1, 0.4), rng.uniform(0.4, 0.55))
     return _rosette(rng) if kind == 1 else _sword_plant(rng)
 
 
@@ -39,18 +43,18 @@ def _aim(blade: Mesh, around: float, up: float, at: tuple[float, float, float]) 
 
 def _bush(rng: np.random.Generator) -> Piece:
     """Three or four stems in a large pot that carry broad leaves from bottom to top."""
-    height, spread = rng.uniform(1.5, 1.9), rng.uniform(0.34, 0.46)
+    height, spread = rng.uniform(1.65, 1.95), rng.uniform(0.42, 0.54)
     pot = rng.uniform(0.3, 0.4)
-    count, width = int(rng.integers(80, 100)), rng.uniform(0.17, 0.24)
+    count, width = int(rng.integers(80, 100)), rng.uniform(0.22, 0.31)
     blades = []
     for i in range(count):
         t = (i + 0.5) / count
         around = GOLDEN * i + rng.uniform(-0.3, 0.3)
         z = pot + 0.02 + (height - pot - 0.22) * t
         bulge = np.sin(np.pi * (0.22 + 0.68 * t))
-        out = spread * bulge * rng.uniform(0.25, 0.65)
+        out = spread * bulge * rng.uniform(0.3, 0.75)
         at = (-out * np.sin(around), out * np.cos(around), z)
-        size = rng.uniform(0.26, 0.36)
+        size = rng.uniform(0.32, 0.42)
         blade = leaf(size, width * rng.uniform(0.8, 1.15), rng.uniform(0.6, 1.2), segments=3)
         blades.append(_aim(blade, around, rng.uniform(0.1, 0.7) + 0.6 * t, at))
     stems = []
@@ -67,22 +71,23 @@ def _bush(rng: np.random.Generator) -> Piece:
     )
 
 
-def _palm(rng: np.random.Generator, height: float, fronds: int, radius: float) -> Piece:
-    """Long arching leaves in pairs from a short trunk."""
-    pot = 0.22 + 0.06 * height
-    reach = height - pot - 0.2
+def _palm(rng: np.random.Generator, trunk: float, reach: float) -> Piece:
+    """A crown of long arching leaves of `reach` metres on a trunk `trunk` metres above the pot."""
+    pot = 0.2 + 0.1 * trunk
+    count, broad = int(rng.integers(26, 34)), 0.11 + 0.1 * reach
     blades = []
-    for i in range(2 * fronds):
-        around, level = GOLDEN * i, i / (2 * fronds)
-        size = reach * rng.uniform(0.65, 0.9) * (1.1 - 0.35 * level)
-        blade = leaf(size, 0.14 * height**0.5, rng.uniform(1.1, 1.9), tip=0.2, segments=6, fold=0.3)
-        at = (0.0, 0.0, pot + 0.03 + reach * 0.45 * level)
-        blades.append(_aim(blade, around, rng.uniform(0.7, 1.0) + 0.4 * level, at))
-    trunk = sweep([(0, 0, pot - 0.08), (0, 0, pot + reach * 0.5)], [0.2 * radius + 0.02, 0.015], 8)
+    for i in range(count):
+        around, level = GOLDEN * i, i / count
+        at = (0.0, 0.0, pot + trunk * (0.6 + 0.4 * level))
+        size, bend = reach * rng.uniform(0.8, 1.0), rng.uniform(0.9, 1.6)
+        blade = leaf(size, broad, bend, tip=0.2, segments=6, fold=0.3)
+        blades.append(_aim(blade, around, 0.45 + 0.8 * level, at))
+    wide = 0.03 + 0.03 * trunk
+    path = [(0.0, 0.0, pot - 0.08), (0.0, 0.0, pot + 1.02 * trunk)]
     return assemble(
         "plant",
-        *_pot(rng, 0.12 + 0.6 * radius, pot),
-        Part(trunk, wood(rng, (0.4, 0.3, 0.18))),
+        *_pot(rng, 0.14 + 0.07 * trunk, pot),
+        Part(sweep(path, [wide, 0.6 * wide], 8), wood(rng, (0.4, 0.3, 0.18))),
         Part(join(blades), leaves(rng)),
     )
 

@@ -206,8 +206,8 @@ def stool(rng: np.random.Generator, large: bool) -> Piece:
     feet = [(1.25 * spread * np.cos(a), 1.25 * spread * np.sin(a), 0.0) for a in angles]
     tops = [(0.6 * radius * np.cos(a), 0.6 * radius * np.sin(a), height - 0.02) for a in angles]
     posts = [bar(f, t, 0.018, 8) for f, t in zip(feet, tops, strict=True)]
-    middle = [tuple(np.array(f) * 0.6 + np.array(t) * 0.4) for f, t in zip(feet, tops, strict=True)]
-    rungs = [bar(middle[i], middle[(i + 1) % 4], 0.011, 6) for i in range(4)]  # type: ignore[arg-type]
+    middle = 0.6 * np.array(feet) + 0.4 * np.array(tops)
+    rungs = [sweep(middle[[i, (i + 1) % 4]], 0.011, 6) for i in range(4)]
     plate = cone(radius, radius, 0.04, (0.0, 0.0, height - 0.03), 20)
     frame = wood(rng) if rng.random() < 0.6 else metal(rng)
     parts = [Part(join([*posts, *rungs]), frame), Part(plate, wood(rng))]

@@ -47,11 +47,16 @@ def _finish(rng: np.random.Generator, axis: int = 2) -> tuple[Material, Material
 def door(width: float, height: float, at: tuple[float, float, float]) -> Mesh:
     """A cupboard door 3 cm thick, its panel set in a bevelled frame; faces +y; at: bottom centre
     of its back."""
-    frame = min(0.08, 0.2 * width)
-    sizes = [(0.0, 0.0), (0.0, 0.03), (frame, 0.03), (frame + 0.015, 0.014)]
+    frame = min(0.08, 0.2 * width, 0.22 * height)
+    sizes = [(0.0, 0.0), (0.0, 0.03), (frame, 0.03), (frame + 0.015, 0.02)]
     rings = [rectangle(width - 2 * f, height - 2 * f, y) for f, y in sizes]
-    upright = loft(rings).turned("x", -np.pi / 2).turned("z", np.pi)
+    upright = loft(rings).turned("x", -np.pi / 2)
     return upright.moved(at[0], at[1], at[2] + height / 2)
+
+
+def gaps(width: float, height: float, front: float, z: float) -> Part:
+    """The dark that shows between doors: a sheet 3 mm in front of a carcass."""
+    return Part(box(width, 0.02, height, (0.0, front - 0.007, z)), solid((0.08, 0.07, 0.06)))
 
 
 def _handle(rng: np.random.Generator, x: float, y: float, z: float, kind: int) -> Mesh:
@@ -78,14 +83,15 @@ def _wardrobe(rng: np.random.Generator) -> Piece:
     for i in range(doors):
         x = -width / 2 + 0.02 + each * (i + 0.5)
         top = height - plinth - 0.1 - low
-        fronts.append(door(each - 0.012, top, (x, front - 0.012, plinth + 0.02 + low)))
+        fronts.append(door(each - 0.016, top, (x, front - 0.012, plinth + 0.02 + low)))
         hinge = 1 if i % 2 else -1
         knobs.append(_handle(rng, x - hinge * (each / 2 - 0.06), front + 0.015, 1.05, kind))
         if low:
-            fronts.append(door(each - 0.012, low - 0.02, (x, front - 0.012, plinth + 0.02)))
+            fronts.append(door(each - 0.016, low - 0.02, (x, front - 0.012, plinth + 0.02)))
             knobs.append(_handle(rng, x, front + 0.0, plinth + 0.13, 2))
     return assemble(
         "cabinet",
+        gaps(width - 0.04, height - plinth - 0.09, front, plinth + 0.015),
         Part(join([body, foot, cornice]), carcass),
         Part(join(fronts), panel),
         Part(join(knobs), metal(rng)),
@@ -113,6 +119,7 @@ def _sideboard(rng: np.random.Generator) -> Piece:
     top = box(width + 0.04, depth + 0.05, 0.03, (0.0, 0.005, height - 0.03))
     return assemble(
         "cabinet",
+        gaps(width - 0.05, height - foot - 0.07, front, foot + 0.025),
         Part(join([body, top, legs(width - 0.05, depth - 0.04, foot + 0.02, 0.05)]), carcass),
         Part(join(fronts), panel),
         Part(join(knobs), metal(rng)),
@@ -136,6 +143,7 @@ def _chest(rng: np.random.Generator) -> Piece:
     foot = box(width - 0.04, depth - 0.06, 0.07)
     return assemble(
         "cabinet",
+        gaps(width - 0.06, height - 0.13, front, 0.065),
         Part(join([body, top, foot]), carcass),
         Part(join(fronts), panel),
         Part(join(knobs), metal(rng)),

@@ -6,6 +6,7 @@ from vlnhijack.scenes.procedural.furniture.piece import Part, Piece, assemble
 from vlnhijack.scenes.procedural.furniture.seating import corners, legs
 from vlnhijack.scenes.procedural.materials import (
     FABRICS,
+    FLOWERS,
     PAINTS,
     WOODS,
     Material,
@@ -76,7 +77,7 @@ def _vase(rng: np.random.Generator, z: float) -> list[Part]:
     return [
         Part(lathe(profile, 12, (0.0, 0.0, z)), glazed(rng)),
         Part(join(stems), leaves(rng)),
-        Part(join(heads), solid(pick(rng, FABRICS, 0.1))),
+        Part(join(heads), solid(pick(rng, FLOWERS))),
     ]
 
 
@@ -193,12 +194,12 @@ def desk(rng: np.random.Generator, large: bool) -> Piece:
         Part(join(drawers), wood(rng, axis=0) if rng.random() < 0.4 else timber),
         Part(join(knobs), metal(rng)),
     ]
-    lid = box(0.34, 0.012, 0.23).turned("x", -0.25).moved(-0.1, 0.13, height + 0.015)
-    screen = box(0.31, 0.006, 0.2).turned("x", -0.25).moved(-0.1, 0.124, height + 0.028)
+    lid = box(0.34, 0.012, 0.23).turned("x", 0.25).moved(-0.1, -0.12, height + 0.015)
+    screen = box(0.31, 0.006, 0.2).turned("x", 0.25).moved(-0.1, -0.112, height + 0.03)
     keyboard = box(0.34, 0.24, 0.015, (-0.1, 0.0, height + 0.008))
     parts += [
         Part(join([lid, keyboard]), metal(rng, (0.5, 0.5, 0.52))),
-        Part(screen.moved(0.0, -0.003), solid((0.3, 0.5, 0.75))),
+        Part(screen, solid((0.3, 0.5, 0.75))),
     ]
     stack = [(box(0.2, 0.27, 0.035, (-0.42, -0.05, height + 0.008 + 0.034 * i))) for i in range(3)]
     parts += [Part(book, solid(pick(rng, FABRICS))) for book in stack]
