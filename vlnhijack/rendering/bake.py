@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 
 from vlnhijack import display
 from vlnhijack.rendering.mitsuba_scene import MitsubaScene, build_scene
-from vlnhijack.rendering.observe import path_tracer
+from vlnhijack.rendering.observe import path_tracer, pixel_means
 from vlnhijack.rendering.samples import RAYS_AT_ONCE
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House, Light
@@ -85,7 +85,7 @@ def _trace(
     for first in range(0, len(points), run):
         index = np.minimum(np.arange(first, first + run), len(points) - 1)
         light[index], is_open[index] = _trace_run(
-            built, points[index], normals[index], spp, seed + first
+            built, points[index], normals[index], spp, (seed + first) % (1 << 32)
         )
     return light, is_open
 
@@ -109,10 +109,8 @@ def _trace_run(
     around = built.scene.ray_intersect(mi.Ray3f(origin, outwards))
     inside = around.is_valid() & (dr.dot(around.n, outwards) > 0)
     light = radiance / dr.maximum(albedo, _SMALLEST_ALBEDO)
-    sums = [dr.block_sum(c, spp) for c in (*light, dr.select(inside, mi.Float(1), 0))]
-    dr.eval(sums)
-    *channels, blocked = (np.array(total) / np.float32(spp) for total in sums)
-    return np.stack(channels, -1), blocked < 0.5
+    means = pixel_means((*light, dr.select(inside, mi.Float(1), 0)), spp)
+    return means[:, :3], means[:, 3] < 0.5
 
 
 def _radiance(

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlnhijack.frames import Camera
-from vlnhijack.rendering.mitsuba_scene import MitsubaScene, build_scene
-from vlnhijack.rendering.samples import camera_rays, centre_rays, chunks, views_sensor
+from vlnhijack.rendering.mitsuba_scene import MitsubaScene, shared_scene
+from vlnhijack.rendering.samples import camera_rays, centre_rays, runs, views_sensor
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
 
@@ -22,15 +22,15 @@ def object_coverage(
     """
     count = len(house.objects)
 
-    def share(built: MitsubaScene, sensor: Any, first: int) -> NDArray[Any]:
-        ray, _ = camera_rays(sensor, seed + first, spp)
+    def share(built: MitsubaScene, sensor: Any, run_seed: int) -> NDArray[Any]:
+        ray, _ = camera_rays(sensor, run_seed, spp)
         views = sensor.film().size()[1] // cameras[0].height
         index = _object_index(house, built, ray).reshape(views, -1)
         bins = index + 1 + np.arange(views)[:, None] * (count + 1)
         hits = np.bincount(bins.ravel(), minlength=views * (count + 1))
         return hits.reshape(views, count + 1)[:, 1:] / index.shape[1]
 
-    return _for_views(house, cameras, spp, share).astype(np.float32)
+    return _for_views(house, cameras, spp, seed, share).astype(np.float32)
 
 
 def object_index_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.int16]:
@@ -40,7 +40,7 @@ def object_index_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.int1
         return _object_index(house, built, centre_rays(sensor)).astype(np.int16)
 
     width, height = cameras[0].width, cameras[0].height
-    return _for_views(house, cameras, 1, index).reshape(-1, height, width)
+    return _for_views(house, cameras, 1, 0, index).reshape(-1, height, width)
 
 
 def depth_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.float32]:
@@ -50,21 +50,22 @@ def depth_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.float32]:
         return np.array(built.scene.ray_intersect_preliminary(centre_rays(sensor)).t)
 
     width, height = cameras[0].width, cameras[0].height
-    return _for_views(house, cameras, 1, distance).reshape(-1, height, width)
+    return _for_views(house, cameras, 1, 0, distance).reshape(-1, height, width)
 
 
 def _for_views(
     house: House,
     cameras: Sequence[Camera],
     spp: int,
+    seed: int,
     measure: Callable[[MitsubaScene, Any, int], NDArray[Any]],
 ) -> NDArray[Any]:
-    """Runs of `measure(scene, sensor, first view)`, joined and cut to V views (V, …)."""
-    built, sensor, found = build_scene(house), None, []
-    for first, run in chunks(cameras, spp):
-        sensor = sensor or views_sensor(run, spp)
-        sensor.aim(run)
-        found.append(measure(built, sensor, first).reshape(len(run), -1))
+    """Runs of `measure(scene, sensor, seed)`, joined and cut to V views (V, …)."""
+    built, sensor, found = shared_scene(house), None, []
+    for run in runs(cameras, spp, seed):
+        sensor = sensor or views_sensor(run.cameras, spp)
+        sensor.aim(run.cameras)
+        found.append(measure(built, sensor, run.seed).reshape(len(run.cameras), -1))
     return np.concatenate(found)[: len(cameras)]
 
 

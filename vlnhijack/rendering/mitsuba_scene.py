@@ -1,6 +1,7 @@
 """A Mitsuba scene in memory, built once from a house."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,12 @@ def build_scene(house: House) -> MitsubaScene:
         content[f"light_{index}"] = _light(light)
     scene = mi.load_dict(content)
     return MitsubaScene(scene, _surface_of_shape(scene))
+
+
+@lru_cache(maxsize=2)
+def shared_scene(house: House) -> MitsubaScene:
+    """The scene of a house for readers, who leave it as it is; the last two are kept."""
+    return build_scene(house)
 
 
 def texture_key(house: House, object_id: str) -> str:

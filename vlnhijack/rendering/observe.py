@@ -1,16 +1,17 @@
 """Many views of a house, without gradients."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from vlnhijack import display
 from vlnhijack.frames import Camera
-from vlnhijack.rendering.mitsuba_scene import MitsubaScene, build_scene
-from vlnhijack.rendering.samples import camera_rays, chunks, views_sensor
+from vlnhijack.rendering.mitsuba_scene import MitsubaScene, shared_scene
+from vlnhijack.rendering.samples import camera_rays, runs, views_sensor
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
 
@@ -27,33 +28,38 @@ def render_views(
     """
     width, height = cameras[0].width, cameras[0].height
     images = np.empty((len(cameras), 3, height, width), np.float32)
-    built, sensor = build_scene(house), None
-    for first, run in chunks(cameras, spp):
-        sensor = sensor or views_sensor(run, spp)
-        sensor.aim(run)
-        radiance = _radiance(built, house.kind, sensor, seed + first, spp)
-        radiance = radiance.reshape(len(run), height, width, 3)[: len(cameras) - first]
+    built, sensor = shared_scene(house), None
+    for run in runs(cameras, spp, seed):
+        sensor = sensor or views_sensor(run.cameras, spp)
+        sensor.aim(run.cameras)
+        radiance = _radiance(built, house.kind, sensor, run.seed, spp)
+        radiance = radiance.reshape(-1, height, width, 3)[: len(cameras) - run.first]
         shown = radiance if house.kind == "baked" else display.encode(house.exposure * radiance)
-        images[first : first + len(run)] = shown.transpose(0, 3, 1, 2)
+        images[run.first : run.first + len(shown)] = shown.transpose(0, 3, 1, 2)
     return torch.from_numpy(images).clamp_(0, 1)
 
 
 def _radiance(
     built: MitsubaScene, kind: str, sensor: Any, seed: int, spp: int
-) -> np.ndarray[Any, np.dtype[np.float32]]:
+) -> NDArray[np.float32]:
     """Mean radiance (pixels, 3) in film order."""
     mi = activate()
-    import drjit as dr
-
     ray, sampler = camera_rays(sensor, seed, spp)
     if kind == "baked":
         interaction = built.scene.ray_intersect(ray, mi.RayFlags.All, True)
         radiance = interaction.emitter(built.scene).eval(interaction)
     else:
         radiance, _, _ = path_tracer().sample(built.scene, sampler, ray)
-    pixels = [dr.block_sum(channel, spp) for channel in radiance]
-    dr.eval(pixels)
-    return np.stack([np.array(channel) for channel in pixels], -1) / np.float32(spp)
+    return pixel_means(radiance, spp)
+
+
+def pixel_means(channels: Iterable[Any], spp: int) -> NDArray[np.float32]:
+    """Means (pixels, C) over the `spp` samples of every pixel of C Dr.Jit Floats."""
+    import drjit as dr
+
+    sums = [dr.block_sum(channel, spp) for channel in channels]
+    dr.eval(sums)
+    return np.stack([np.array(total) for total in sums], -1) / np.float32(spp)
 
 
 @cache

@@ -6,6 +6,7 @@ Mitsuba's own integrators: `mi.render` with the same sensor, seed and spp uses t
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -77,17 +78,28 @@ def centre_rays(sensor: Any) -> Any:
     return ray
 
 
-def chunks(cameras: Sequence[Camera], spp: int) -> Iterator[tuple[int, list[Camera]]]:
-    """(first index, cameras) of equally long runs of at most RAYS_AT_ONCE rays.
+@dataclass(frozen=True)
+class Run:
+    """A run of cameras that render in one wavefront, from camera number `first` on."""
 
-    The last run is filled up with its last camera, so that one compiled kernel serves all.
+    first: int
+    cameras: list[Camera]
+    seed: int
+
+
+def runs(cameras: Sequence[Camera], spp: int, seed: int = 0) -> Iterator[Run]:
+    """Equally long runs of at most RAYS_AT_ONCE rays, each with a seed of its own.
+
+    The last run is filled up with its last camera, so that one compiled kernel serves all. Whoever
+    renders the same cameras, spp and seed by these runs uses the same rays.
     """
     check_cameras(cameras)
     rays = cameras[0].width * cameras[0].height * spp
     length = min(max(1, RAYS_AT_ONCE // rays), len(cameras))
     for first in range(0, len(cameras), length):
         run = list(cameras[first : first + length])
-        yield first, run + [run[-1]] * (length - len(run))
+        run += [run[-1]] * (length - len(run))
+        yield Run(first, run, (seed + first) % (1 << 32))
 
 
 @cache
