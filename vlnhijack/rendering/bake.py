@@ -1,7 +1,7 @@
 """Path-traced light baked into textures, as scans carry it.
 
 Diffuse light does not depend on the view: per texel, Mitsuba's path tracer looks at the surface
-from a millimetre in front of it. Light varies more slowly than albedo, so it is traced at half the
+from a millimetre in front of it. Light varies more slowly than albedo, so it is traced at a lower
 resolution, smoothed across coplanar neighbours and multiplied by the albedo.
 """
 
@@ -21,7 +21,7 @@ from vlnhijack.scenes.surface import Surface
 from vlnhijack.scenes.uv_atlas import Texels, dilate, rasterise
 
 BRIGHTNESS = 0.45
-LARGE = 48
+_LIGHT_SHRINK = {256: 4, 48: 2}
 _IN_FRONT = 1.5e-3
 _SMALLEST_ALBEDO = 1e-3
 
@@ -38,7 +38,7 @@ class _LightMap:
     normals: Floats
 
 
-def bake(lit: House, spp: int = 32, seed: int = 0) -> House:
+def bake(lit: House, spp: int = 64, seed: int = 0) -> House:
     """The baked house of a lit one: textures hold encode(clip(exposure · radiance)).
 
     An exposure of 1 is replaced by the one that gives a mean texel of 0.45; the house that is
@@ -62,7 +62,9 @@ def bake(lit: House, spp: int = 32, seed: int = 0) -> House:
 
 
 def _shrink(surface: Surface) -> int:
-    return 2 if max(surface.texture.shape[:2]) > LARGE else 1
+    """Texels per light texel: walls and floors take 4, furniture 2, the smallest textures 1."""
+    side = max(surface.texture.shape[:2])
+    return next((shrink for above, shrink in _LIGHT_SHRINK.items() if side > above), 1)
 
 
 def _light_map(surface: Surface, shrink: int) -> _LightMap:

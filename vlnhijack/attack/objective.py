@@ -1,0 +1,83 @@
+"""The attack's loss: −log π of the attack trajectory after the guide trajectory (paper, eq. 1)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vlnhijack.agents.checkpoints import Agent
+from vlnhijack.agents.observation import ObservationTable
+from vlnhijack.agents.trajectory import (
+    Instructions,
+    Trajectories,
+    read_instructions,
+    step_logits,
+    trajectories,
+)
+from vlnhijack.navigation.episode import Episode
+from vlnhijack.threat import AttackInstance, guide
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Teacher-forced attack trajectories of all the given episodes, tabulated once.
+
+    walked: guide + attack trajectory of each of E episodes; first (E,) step at v_ATK;
+    instructions: their encoded text, which never changes.
+    """
+
+    agent: Agent
+    table: ObservationTable
+    walked: Trajectories
+    first: Tensor
+    instructions: Instructions
+
+    def __call__(self, features: Tensor, episodes: Tensor) -> Tensor:
+        """Loss of each of the episodes (B,), summed over its attack steps; (B,), in nats.
+
+        features (M,36,D) of all viewpoints; gradients flow through observations and history.
+        """
+        walked = Trajectories(*(part[episodes] for part in self.walked))
+        batch, steps = _attack_steps(self.first[episodes], walked.lengths)
+        logits = step_logits(
+            self.agent.policy,
+            self.table,
+            features,
+            self.instructions.rows(episodes),
+            walked,
+            batch,
+            steps,
+        )
+        actions = walked.actions(self.table)[batch, steps]
+        negative = -logits.log_softmax(1).gather(1, actions[:, None])[:, 0]
+        return negative.new_zeros(len(episodes)).index_add(0, batch, negative)
+
+
+def attack_objective(
+    agent: Agent, table: ObservationTable, instance: AttackInstance, episodes: Sequence[Episode]
+) -> Objective:
+    """The objective of an instance over the given episodes."""
+    guides = [guide(instance, episode) for episode in episodes]
+    attacked = [
+        [table.index[instance.scan, viewpoint] for viewpoint in (*walk, *instance.trajectory)]
+        for walk in guides
+    ]
+    with torch.no_grad():
+        instructions = read_instructions(agent.policy, agent.vocabulary, episodes)
+    walked = trajectories(table, attacked, [episode.heading for episode in episodes])
+    return Objective(
+        agent=agent,
+        table=table,
+        walked=walked,
+        first=torch.tensor([len(walk) - 1 for walk in guides]),
+        instructions=instructions,
+    )
+
+
+def _attack_steps(first: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+    counts = lengths - first
+    batch = torch.repeat_interleave(torch.arange(len(first)), counts)
+    start = torch.repeat_interleave(counts.cumsum(0) - counts, counts)
+    return batch, torch.arange(len(batch)) - start + first[batch]

@@ -1,0 +1,115 @@
+"""Optimise the texture of one object (paper, section 3.1)."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vlnhijack import seeds
+from vlnhijack.agents.encoder import ViewEncoder
+from vlnhijack.attack.objective import Objective
+from vlnhijack.attack.projected_adam import ProjectedAdam
+from vlnhijack.errors import CheckError
+from vlnhijack.rendering.renderer import Renderer
+
+
+@dataclass(frozen=True)
+class AttackSchedule:
+    """The paper's settings: 300 iterations of 16 episodes, Adam 0.01, a checkpoint every 30."""
+
+    iterations: int = 300
+    batch: int = 16
+    epsilon: float = 0.3
+    lr: float = 0.01
+    betas: tuple[float, float] = (0.9, 0.999)
+    checkpoint_every: int = 30
+
+
+@dataclass(frozen=True, eq=False)
+class AttackedViews:
+    """The views that the attack renders: V cameras, and their place in the feature table.
+
+    viewpoints (V,) rows and views (V,) indices into features (M,36,D).
+    """
+
+    renderer: Renderer
+    encoder: ViewEncoder
+    clean: Tensor
+    viewpoints: Tensor
+    views: Tensor
+
+    def features(self, texture: Tensor) -> Tensor:
+        """All features (M,36,D) with the rows of the rendered views replaced; differentiable."""
+        rendered = self.encoder(self.renderer(texture))
+        return self.clean.index_put((self.viewpoints, self.views), rendered)
+
+
+class Iteration(NamedTuple):
+    """What one iteration measured; `iteration` counts from 1."""
+
+    iteration: int
+    loss: float
+    gradient_norm: float
+    largest_change: float
+    seconds: float
+
+
+def optimise(
+    texture: ProjectedAdam,
+    views: AttackedViews,
+    objective: Objective,
+    schedule: AttackSchedule,
+    seed: int,
+    first: int = 0,
+) -> Iterator[Iteration]:
+    """Take the steps first+1 … iterations on `texture`, yielding what each measured.
+
+    The batch of an iteration depends on seed and iteration only, so a resumed run repeats it.
+    Raises CheckError if the loss or the gradient is not finite.
+    """
+    for iteration in range(first + 1, schedule.iterations + 1):
+        started = time.perf_counter()
+        episodes = batch_of(seed, iteration, len(objective.first), schedule.batch)
+        loss = objective(views.features(texture.value), episodes).mean()
+        (gradient,) = torch.autograd.grad(loss, texture.value)
+        norm = float(gradient.norm())
+        if not (torch.isfinite(loss) and np.isfinite(norm)):
+            raise CheckError(f"iteration {iteration}: the loss or its gradient is not finite")
+        texture.step(gradient)
+        yield Iteration(
+            iteration, loss.item(), norm, texture.largest_change(), time.perf_counter() - started
+        )
+
+
+def batch_of(seed: int, iteration: int, episodes: int, batch: int) -> Tensor:
+    """The episodes (B,) of an iteration: every epoch visits each episode once, in a new order."""
+    start = (iteration - 1) * batch
+    picked = [
+        _epoch_order(seed, position // episodes, episodes)[position % episodes]
+        for position in range(start, start + batch)
+    ]
+    return torch.tensor(picked)
+
+
+def _epoch_order(seed: int, epoch: int, episodes: int) -> list[int]:
+    return seeds.stream(seed, "attack", "epoch", epoch).permutation(episodes).tolist()
+
+
+class Validation(NamedTuple):
+    """How good a checkpoint is on the validation episodes."""
+
+    iteration: int
+    ndtw: float
+    loss: float
+
+
+Validate = Callable[[Tensor, int], Validation]
+
+
+def best(checkpoints: list[Validation]) -> Validation:
+    """Highest nDTW to the attack trajectory; ties: lower loss, then earlier."""
+    return min(checkpoints, key=lambda c: (-c.ndtw, c.loss, c.iteration))

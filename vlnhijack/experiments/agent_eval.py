@@ -1,0 +1,44 @@
+"""Measure a clean agent on freshly rendered views."""
+
+from typing import Any
+
+import torch
+from rich.progress import Progress
+
+from vlnhijack import seeds
+from vlnhijack.agents.checkpoints import load_agent
+from vlnhijack.experiments.context import agent_file
+from vlnhijack.experiments.train_agent import AgentConfig, measure
+from vlnhijack.experiments.views import encode_house
+from vlnhijack.agents.observation import observation_table
+from vlnhijack.scenes.house_files import load_house
+from vlnhijack.settings import house_folder
+
+
+def evaluate_agent(name: str, spp: int, seed: int, progress: Progress) -> dict[str, Any]:
+    """Clean rates on val_seen and val_unseen of the houses the agent was trained with.
+
+    The same form as the metadata of the agent: see `measure`.
+    """
+    agent = load_agent(agent_file(name))
+    config = AgentConfig.model_validate(agent.metadata["config"])
+    houses = {
+        house: load_house(house_folder(house))
+        for house in [*config.train_houses, *config.unseen_houses]
+    }
+    parts = []
+    for house in houses.values():
+        task = progress.add_task(
+            f"views of {house.name}", total=36 * len(house.graph.viewpoints)
+        )
+        parts.append(
+            encode_house(
+                house,
+                agent.encoder,
+                spp,
+                seeds.integer(seed, "views", house.name),
+                lambda views, task=task: progress.advance(task, views),
+            )
+        )
+    table = observation_table([house.graph for house in houses.values()])
+    return measure(config, agent, table, torch.cat(parts), houses)

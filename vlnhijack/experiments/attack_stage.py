@@ -1,0 +1,234 @@
+"""Optimise one instance, keep its checkpoints, export the attacked house."""
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from rich.progress import TaskID
+from safetensors.torch import load_file, save
+from torch import Tensor
+
+from vlnhijack.artifacts import read_json, write_bytes, write_json, write_text
+from vlnhijack.attack.objective import Objective, attack_objective
+from vlnhijack.attack.optimise import (
+    AttackedViews,
+    AttackSchedule,
+    Iteration,
+    Validation,
+    best,
+    optimise,
+)
+from vlnhijack.attack.projected_adam import ProjectedAdam
+from vlnhijack.evaluation.evaluate import evaluate_instance
+from vlnhijack.experiments.baseline import clean_features
+from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.views import house_cameras
+from vlnhijack.rendering.frozen_renderer import FrozenRenderer
+from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
+from vlnhijack.rendering.renderer import Renderer
+from vlnhijack.scenes.exr import write_exr
+from vlnhijack.scenes.house_files import save_house
+from vlnhijack.scenes.uv_atlas import used_texels
+from vlnhijack.threat import AttackInstance, quantise
+
+RENDERERS = {"frozen": FrozenRenderer, "mitsuba": MitsubaRenderer}
+
+
+@dataclass(frozen=True, eq=False)
+class AttackFiles:
+    """The files of one attack in its folder."""
+
+    folder: Path
+
+    @property
+    def result(self) -> Path:
+        return self.folder / "attack.json"
+
+    @property
+    def log(self) -> Path:
+        return self.folder / "log.jsonl"
+
+    @property
+    def validations(self) -> Path:
+        return self.folder / "validation.jsonl"
+
+    @property
+    def house(self) -> Path:
+        return self.folder / "house"
+
+    def state(self, iteration: int) -> Path:
+        return self.folder / "checkpoints" / f"{iteration:05d}.safetensors"
+
+    def last_iteration(self) -> int:
+        """The iteration of the last checkpoint that was validated; 0 without one."""
+        return max((row["iteration"] for row in read_rows(self.validations)), default=0)
+
+
+def attack(context: Context, instance: AttackInstance) -> float:
+    """Run or finish the attack of an instance; the seconds that its optimisation took."""
+    files = AttackFiles(context.folder / "attacks" / instance.id)
+    if files.result.exists():
+        return float(read_json(files.result)["seconds"])
+    settings = context.config.attack
+    original = context.houses[instance.scan].surface(instance.object_id).texture
+    texture = _texture(context, instance, original)
+    first = files.last_iteration()
+    elapsed = _resume(files, texture, first)
+    started = time.perf_counter() - elapsed
+    task = context.progress.add_task(instance.id, total=settings.iterations, completed=first)
+    for _ in _checkpointed(context, instance, texture, files, first, task, started):
+        pass
+    kept = best([Validation(*_validation_fields(row)) for row in read_rows(files.validations)])
+    final = load_file(files.state(kept.iteration))["texture"].numpy()
+    exported = quantise(final, original, settings.epsilon)
+    house = context.houses[instance.scan].with_texture(instance.object_id, exported)
+    save_house(house, files.house)
+    seconds = time.perf_counter() - started
+    write_json(files.result, {"best": kept._asdict(), "seconds": seconds})
+    return seconds
+
+
+def object_views(
+    context: Context, instance: AttackInstance, viewpoints: list[str] | None = None
+) -> tuple[Tensor, Tensor]:
+    """Table rows (V,) and views (V,) in which the object is seen, at the given viewpoints or all."""
+    scan = context.scans[instance.scan]
+    column = [item.id for item in scan.house.objects].index(instance.object_id)
+    seen = scan.coverage[:, :, column] > 0
+    if viewpoints is not None:
+        allowed = np.zeros(len(seen), bool)
+        allowed[[scan.house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
+        seen &= allowed[:, None]
+    rows, views = np.nonzero(seen)
+    return torch.from_numpy(rows + context.rows(instance.scan).start), torch.from_numpy(views)
+
+
+def attacked_views(
+    context: Context, instance: AttackInstance, viewpoints: list[str] | None, stream: str
+) -> AttackedViews:
+    """The object's views, rendered at the samples of the named stream."""
+    house, settings = context.houses[instance.scan], context.config.rendering
+    rows, views = object_views(context, instance, viewpoints)
+    height, width = context.agent.encoder.image_size
+    cameras = house_cameras(house.graph, width, height)
+    start = context.rows(instance.scan).start
+    wanted = [cameras[36 * (row - start) + view] for row, view in zip(rows, views, strict=True)]
+    make = RENDERERS[settings.rung] if stream == "attack" else FrozenRenderer
+    renderer: Renderer = make(
+        house,
+        instance.object_id,
+        wanted,
+        spp=settings.attack_spp,
+        seed=context.seed("views", stream, instance.id),
+    )
+    clean = context.place(clean_features(context, instance.scan), instance.scan)
+    return AttackedViews(renderer, context.agent.encoder, clean, rows, views)
+
+
+def _texture(context: Context, instance: AttackInstance, original: np.ndarray) -> ProjectedAdam:
+    settings = context.config.attack
+    surface = context.houses[instance.scan].surface(instance.object_id)
+    used = used_texels(surface.uv, surface.faces, *original.shape[:2])
+    return ProjectedAdam(
+        torch.from_numpy(original),
+        torch.from_numpy(used),
+        epsilon=settings.epsilon,
+        lr=settings.lr,
+        betas=settings.betas,
+    )
+
+
+def _checkpointed(
+    context: Context,
+    instance: AttackInstance,
+    texture: ProjectedAdam,
+    files: AttackFiles,
+    first: int,
+    task: TaskID,
+    started: float,
+) -> Iterator[Iteration]:
+    settings = context.config.attack
+    schedule = AttackSchedule(**settings.model_dump(exclude={"rendered_viewpoints"}))
+    near = instance.target_path[: settings.rendered_viewpoints]
+    views = attacked_views(context, instance, near, "attack")
+    objective = attack_objective(context.agent, context.table, instance, instance.train)
+    validation = attacked_views(context, instance, None, "validation")
+    held_out = attack_objective(context.agent, context.table, instance, instance.validation)
+    seed = context.seed("attack", instance.id)
+    for row in optimise(texture, views, objective, schedule, seed, first):
+        append_row(files.log, row._asdict())
+        context.progress.update(
+            task, completed=row.iteration, description=f"{instance.id}, loss {row.loss:.3f}"
+        )
+        if row.iteration % schedule.checkpoint_every == 0 or row.iteration == schedule.iterations:
+            found = _validate(context, instance, validation, held_out, texture, row.iteration)
+            _save_checkpoint(files, texture, found, time.perf_counter() - started)
+        yield row
+
+
+@torch.no_grad()
+def _validate(
+    context: Context,
+    instance: AttackInstance,
+    views: AttackedViews,
+    objective: Objective,
+    texture: ProjectedAdam,
+    iteration: int,
+) -> Validation:
+    features = views.features(texture.value)
+    loss = objective(features, torch.arange(len(objective.first))).mean()
+    records = evaluate_instance(
+        context.agent,
+        context.table,
+        features,
+        instance,
+        "attacked",
+        {"Validation": instance.validation},
+    )
+    return Validation(iteration, float(np.mean([r.attack_ndtw for r in records])), loss.item())
+
+
+def _save_checkpoint(
+    files: AttackFiles, texture: ProjectedAdam, found: Validation, seconds: float
+) -> None:
+    write_bytes(files.state(found.iteration), save(texture.state()))
+    write_exr(files.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
+    append_row(files.validations, {**found._asdict(), "seconds": seconds})
+
+
+def _resume(files: AttackFiles, texture: ProjectedAdam, first: int) -> float:
+    """Load the checkpoint of iteration `first` and forget what came after; seconds spent so far."""
+    files.folder.mkdir(parents=True, exist_ok=True)
+    kept = [row for row in read_rows(files.log) if row["iteration"] <= first]
+    write_text(files.log, "".join(json.dumps(row) + "\n" for row in kept))
+    if first == 0:
+        return 0.0
+    texture.load(load_file(files.state(first)))
+    validated = {row["iteration"]: row["seconds"] for row in read_rows(files.validations)}
+    return float(validated[first])
+
+
+def _validation_fields(row: dict) -> tuple[int, float, float]:
+    return row["iteration"], row["ndtw"], row["loss"]
+
+
+def append_row(path: Path, row: dict) -> None:
+    with path.open("a") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+def read_rows(path: Path) -> list[dict]:
+    """Rows of a JSONL file; a last line cut off by a crash is dropped, a missing file is empty."""
+    if not path.exists():
+        return []
+    rows = []
+    for line in path.read_text().splitlines():
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError:
+            break
+    return rows

@@ -1,0 +1,71 @@
+"""Clean features of every house, and the gate that they pass."""
+
+import time
+from pathlib import Path
+
+from safetensors.torch import load_file, save
+from torch import Tensor
+
+from vlnhijack.artifacts import read_json, write_bytes, write_json
+from vlnhijack.errors import InputError
+from vlnhijack.evaluation.evaluate import navigate
+from vlnhijack.evaluation.gate import check_baseline
+from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.views import encode_house
+
+
+def clean_features(context: Context, scan: str) -> Tensor:
+    """Features (M,36,D) of the clean house, at the samples of the evaluation."""
+    path = context.folder / "baseline" / f"{scan}.safetensors"
+    if path.exists():
+        return load_file(path)["features"]
+    house = context.houses[scan]
+    task = context.progress.add_task(
+        f"clean views of {scan}", total=36 * len(house.graph.viewpoints)
+    )
+    features = encode_house(
+        house,
+        context.agent.encoder,
+        context.config.rendering.evaluation_spp,
+        context.seed("views", "evaluation", scan),
+        lambda views: context.progress.advance(task, views),
+    )
+    write_bytes(path, save({"features": features}))
+    return features
+
+
+def baseline(context: Context, scan: str) -> float:
+    """Pass the gate or raise CheckError; the seconds that this took when it was done."""
+    path = context.folder / "baseline" / f"{scan}.json"
+    if path.exists():
+        return float(read_json(path)["seconds"])
+    started = time.perf_counter()
+    features = context.place(clean_features(context, scan), scan)
+    episodes = context.scans[scan].val_seen
+    scores = navigate(context.agent, context.table, features, episodes)
+    successes = int(sum(score.success for score in scores))
+    recorded = _recorded_rate(context.agent.metadata, context.agent.path, scan)
+    check_baseline(scan, successes, len(episodes), recorded)
+    seconds = time.perf_counter() - started
+    write_json(
+        path,
+        {
+            "successes": successes,
+            "episodes": len(episodes),
+            "recorded_sr": recorded,
+            "seconds": seconds,
+        },
+    )
+    return seconds
+
+
+def _recorded_rate(metadata: dict, weights: Path, scan: str) -> float:
+    known = metadata.get("val_seen_by_house", {})
+    if scan not in known:
+        raise InputError(
+            file=weights.with_suffix(".json"),
+            field="metadata.val_seen_by_house",
+            expected=f"the clean rate in {scan}",
+            received=", ".join(known) or "none",
+        )
+    return float(known[scan]["sr"])

@@ -1,0 +1,85 @@
+"""What an experiment file may say."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from vlnhijack.experiments.yaml_config import Settings
+
+CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
+Kind = Literal["single_step", "trajectory"]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class PickedInstance(Settings):
+    """One attack chosen by hand; target is the last viewpoint of the attack trajectory."""
+
+    kind: Kind
+    house: str
+    object: str
+    viewpoint: str
+    target: str | None = None
+
+
+class DrawnInstances(Settings):
+    """Attacks drawn by the seed among all that fulfil the rules of the paper, section 3.2."""
+
+    kind: Kind
+    houses: list[str]
+    count: PositiveInt
+
+
+class InstanceRules(Settings):
+    """Which attacks are possible.
+
+    An object of `categories` fills at least min_coverage (at most max_coverage) of a view at
+    v_ATK; at least min_train training episodes on min_paths paths pass through v_ATK after leaving
+    out those with a test episode's guide trajectory; at least min_test test episodes. The attack
+    trajectory ends at least target_distance metres (geodesic) from v_ATK and from every test
+    episode's goal, off its path, at most max_steps edges away. validation is the share of paths
+    kept for choosing the checkpoint.
+    """
+
+    categories: tuple[str, ...] = CATEGORIES
+    min_coverage: Share = 0.4
+    max_coverage: Share = 1.0
+    min_train: PositiveInt = 5
+    min_paths: PositiveInt = 2
+    min_test: PositiveInt = 3
+    target_distance: PositiveFloat = 3.0
+    max_steps: PositiveInt = 5
+    validation: Share = 0.2
+
+
+class RenderSettings(Settings):
+    """Renderer of the attack, and samples per pixel of the attack, validation and evaluation."""
+
+    rung: Literal["frozen", "mitsuba"] = "frozen"
+    attack_spp: PositiveInt = 16
+    evaluation_spp: PositiveInt = 16
+
+
+class AttackSettings(Settings):
+    """The paper's settings (section 4); see AttackSchedule."""
+
+    iterations: PositiveInt = 300
+    batch: PositiveInt = 16
+    epsilon: Annotated[float, Field(gt=0, le=1)] = 0.3
+    lr: PositiveFloat = 0.01
+    betas: tuple[Share, Share] = (0.9, 0.999)
+    checkpoint_every: PositiveInt = 30
+    rendered_viewpoints: PositiveInt = 3
+
+
+class ExperimentConfig(Settings):
+    """An experiment: an agent, attacks on it, and how they are made."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+    note: str = ""
+    seed: int = 0
+    threads: PositiveInt = 2
+    agent: str = "small"
+    instances: list[PickedInstance] | DrawnInstances
+    rules: InstanceRules = InstanceRules()
+    rendering: RenderSettings = RenderSettings()
+    attack: AttackSettings = AttackSettings()

@@ -1,0 +1,86 @@
+"""What every stage of a run shares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from rich.progress import Progress
+from torch import Tensor
+
+from vlnhijack import seeds
+from vlnhijack.agents.checkpoints import Agent, load_agent
+from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.experiments.config import ExperimentConfig
+from vlnhijack.experiments.instances import Scan
+from vlnhijack.experiments.views import coverage_table
+from vlnhijack.navigation.episode import Episode, load_episodes
+from vlnhijack.scenes.house import House
+from vlnhijack.scenes.house_files import load_house
+from vlnhijack.settings import WEIGHTS, house_folder
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """An experiment's agent and houses, loaded once, and its run folder."""
+
+    config: ExperimentConfig
+    folder: Path
+    progress: Progress
+    agent: Agent
+    houses: dict[str, House]
+
+    @cached_property
+    def table(self) -> ObservationTable:
+        return observation_table([house.graph for house in self.houses.values()])
+
+    def rows(self, scan: str) -> slice:
+        """Rows of a scan's viewpoints in the table and in feature tensors."""
+        graph = self.houses[scan].graph
+        first = self.table.index[scan, graph.viewpoints[0]]
+        return slice(first, first + len(graph.viewpoints))
+
+    def seed(self, *names: str | int) -> int:
+        """The integer seed named by `names` under the experiment's seed."""
+        return seeds.integer(self.config.seed, *names)
+
+    @cached_property
+    def scans(self) -> dict[str, Scan]:
+        """Coverage and episodes of every house."""
+        height, width = self.agent.encoder.image_size
+        return {
+            name: Scan(
+                house=house,
+                coverage=coverage_table(house, width, height),
+                train=episodes_of(house, "train"),
+                val_seen=episodes_of(house, "val_seen"),
+            )
+            for name, house in self.houses.items()
+        }
+
+    def place(self, features: Tensor, scan: str) -> Tensor:
+        """Features (M,36,D) of one scan in a tensor of all viewpoints of the table."""
+        everywhere = features.new_zeros(len(self.table.index), *features.shape[1:])
+        everywhere[self.rows(scan)] = features
+        return everywhere
+
+
+def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
+    """Load the agent and the houses that the experiment names."""
+    if isinstance(config.instances, list):
+        names = sorted({picked.house for picked in config.instances})
+    else:
+        names = list(config.instances.houses)
+    houses = {name: load_house(house_folder(name)) for name in names}
+    return Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+
+
+def agent_file(name: str) -> Path:
+    """Weights shipped under that name, or a path to a .safetensors file."""
+    return Path(name) if name.endswith(".safetensors") else WEIGHTS / f"{name}.safetensors"
+
+
+def episodes_of(house: House, split: str) -> Sequence[Episode]:
+    """Episodes of a split ("train", "val_seen", "val_unseen") of a house of the data root."""
+    file = house_folder(house.name) / "episodes" / f"{split}.json"
+    return load_episodes(file, {house.name: house.graph})

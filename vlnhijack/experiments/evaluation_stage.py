@@ -1,0 +1,138 @@
+"""Reload the attacked house, check that the texture was applied, evaluate every arm."""
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pandas as pd
+import torch
+from torch import Tensor
+
+from vlnhijack.artifacts import read_json, write_json
+from vlnhijack.evaluation.apply_check import (
+    check_other_samples,
+    check_same_samples,
+    check_texels,
+)
+from vlnhijack.evaluation.controls import noise_textures
+from vlnhijack.evaluation.evaluate import evaluate_instance
+from vlnhijack.evaluation.records import load_records, save_records, to_frame
+from vlnhijack.experiments.attack_stage import AttackFiles, object_views
+from vlnhijack.experiments.baseline import clean_features
+from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.views import encode_house, house_cameras
+from vlnhijack.frames import Camera
+from vlnhijack.rendering.frozen_renderer import FrozenRenderer
+from vlnhijack.rendering.observe import render_views
+from vlnhijack.scenes.house import House
+from vlnhijack.scenes.house_files import load_house
+from vlnhijack.threat import AttackInstance, quantise
+
+_SEEDS = 8
+
+
+def evaluate(context: Context, instance: AttackInstance) -> tuple[pd.DataFrame, float]:
+    """Records of all arms and conditions of an attacked instance, and the seconds it took."""
+    folder = context.folder / "attacks" / instance.id
+    records_file, report = folder / "records.parquet", folder / "evaluation.json"
+    if report.exists():
+        return load_records(records_file), float(read_json(report)["seconds"])
+    started = time.perf_counter()
+    attacked = load_house(AttackFiles(folder).house)
+    checks = apply_check(context, instance, attacked)
+    conditions = {
+        "Train": instance.train,
+        "Validation": instance.validation,
+        "Test": instance.test,
+    }
+    records = []
+    for arm, features in _arms(context, instance, attacked).items():
+        records += evaluate_instance(
+            context.agent, context.table, features(), instance, arm, conditions
+        )
+    frame = to_frame(records)
+    save_records(records_file, frame)
+    seconds = time.perf_counter() - started
+    write_json(report, {"apply_check": checks, "seconds": seconds})
+    return frame, seconds
+
+
+def apply_check(context: Context, instance: AttackInstance, attacked: House) -> dict[str, float]:
+    """What was optimised is what lies on disk; raises CheckError where it is not."""
+    original = context.houses[instance.scan]
+    texture = _exported(context, instance)
+    epsilon = context.config.attack.epsilon
+    excess = check_texels(
+        attacked, instance.object_id, texture, original.surface(instance.object_id).texture, epsilon
+    )
+    cameras = attack_cameras(context, instance)
+    spp = context.config.rendering.attack_spp
+
+    def optimiser(seed: int) -> Tensor:
+        renderer = FrozenRenderer(original, instance.object_id, cameras, spp=spp, seed=seed)
+        with torch.no_grad():
+            return renderer(torch.from_numpy(texture))
+
+    def seeds_of(render: Callable[[int], Tensor], stream: str) -> list[Tensor]:
+        return [render(context.seed(stream, instance.id, k)) for k in range(_SEEDS)]
+
+    def reloaded(seed: int) -> Tensor:
+        return render_views(attacked, cameras, spp, seed)
+
+    seed = context.seed("apply", "same", instance.id)
+    largest = check_same_samples(optimiser(seed), reloaded(seed))
+    smallest_p, tests = check_other_samples(
+        seeds_of(optimiser, "apply optimiser"), seeds_of(reloaded, "apply reloaded")
+    )
+    return {
+        "excess_over_epsilon": excess,
+        "largest_difference_same_samples": largest,
+        "smallest_p_other_samples": smallest_p,
+        "tests_other_samples": tests,
+    }
+
+
+def attack_cameras(context: Context, instance: AttackInstance) -> list[Camera]:
+    """The agent's views at v_ATK in which the object is seen."""
+    height, width = context.agent.encoder.image_size
+    cameras = house_cameras(context.houses[instance.scan].graph, width, height)
+    start = context.rows(instance.scan).start
+    rows, views = object_views(context, instance, [instance.viewpoint])
+    return [cameras[36 * (row - start) + view] for row, view in zip(rows, views, strict=True)]
+
+
+def _exported(context: Context, instance: AttackInstance):
+    from safetensors.torch import load_file
+
+    files = AttackFiles(context.folder / "attacks" / instance.id)
+    kept = read_json(files.result)["best"]["iteration"]
+    original = context.houses[instance.scan].surface(instance.object_id).texture
+    optimised = load_file(files.state(kept))["texture"].numpy()
+    return quantise(optimised, original, context.config.attack.epsilon)
+
+
+def _arms(
+    context: Context, instance: AttackInstance, attacked: House
+) -> Mapping[str, Callable[[], Tensor]]:
+    """Features (M,36,D) of each arm, computed when called."""
+    house = context.houses[instance.scan]
+    original = house.surface(instance.object_id).texture
+    noise = noise_textures(
+        original, context.config.attack.epsilon, context.seed("noise", instance.id)
+    )
+    arms = {"clean": lambda: context.place(clean_features(context, instance.scan), instance.scan)}
+    for name, texture in noise.items():
+        changed = house.with_texture(instance.object_id, texture)
+        arms[name] = lambda changed=changed: _features(context, instance, changed)
+    arms["attacked"] = lambda: _features(context, instance, attacked)
+    return arms
+
+
+def _features(context: Context, instance: AttackInstance, house: House) -> Tensor:
+    features = encode_house(
+        house,
+        context.agent.encoder,
+        context.config.rendering.evaluation_spp,
+        context.seed("views", "evaluation", instance.scan),
+    )
+    return context.place(features, instance.scan)

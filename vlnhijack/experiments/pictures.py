@@ -1,0 +1,50 @@
+"""The pictures of an attack: the object before and after, the map, the curves."""
+
+import pandas as pd
+
+from vlnhijack.experiments.attack_stage import AttackFiles, read_rows
+from vlnhijack.experiments.context import Context
+from vlnhijack.navigation.views import panorama_cameras
+from vlnhijack.rendering.observe import render_views
+from vlnhijack.report.figures import before_after, curve, save_image, trajectory_map
+from vlnhijack.scenes.house_files import load_house
+from vlnhijack.threat import AttackInstance
+
+WIDTH, HEIGHT, SPP = 640, 480, 16
+_VIEWS = 3
+
+
+def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame) -> None:
+    """Write the pictures of an evaluated instance, unless they are there."""
+    folder = context.folder / "attacks" / instance.id
+    if (folder / "map.png").exists():
+        return
+    files = AttackFiles(folder)
+    house, attacked = context.houses[instance.scan], load_house(files.house)
+    views = _best_views(context, instance)
+    position = house.graph.positions[house.graph.row(instance.viewpoint)].tolist()
+    cameras = [panorama_cameras(tuple(position), WIDTH, HEIGHT)[view] for view in views]
+    seed = context.seed("pictures", instance.id)
+    before, after = (
+        render_views(shown, cameras, SPP, seed).numpy() for shown in (house, attacked)
+    )
+    for name, images in (("before", before), ("after", after)):
+        for view, image in zip(views, images, strict=True):
+            save_image(folder / "views" / f"{name}_{view:02d}.png", image)
+    before_after(
+        folder / "before_after.png", list(before), list(after), [f"view {view}" for view in views]
+    )
+    curve(folder / "curve.png", read_rows(files.log), read_rows(files.validations))
+    test = records[records["condition"] == "Test"]
+    clean, hijacked = (
+        [list(path) for path in test.loc[test["arm"] == arm, "path"]] for arm in ("clean", "attacked")
+    )
+    trajectory_map(folder / "map.png", house, instance, clean, hijacked)
+
+
+def _best_views(context: Context, instance: AttackInstance) -> list[int]:
+    """The views at v_ATK that the object fills most, in the order of the panorama."""
+    scan = context.scans[instance.scan]
+    column = [item.id for item in scan.house.objects].index(instance.object_id)
+    shares = scan.coverage[scan.house.graph.row(instance.viewpoint), :, column]
+    return sorted(int(view) for view in shares.argsort()[::-1][:_VIEWS] if shares[view] > 0)

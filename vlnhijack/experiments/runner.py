@@ -1,0 +1,117 @@
+"""Run an experiment: baseline → attack → evaluation of every instance → summary."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import torch
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from vlnhijack.artifacts import read_json, write_json
+from vlnhijack.errors import InputError
+from vlnhijack.evaluation.records import save_records
+from vlnhijack.evaluation.tables import rows_for_print, summarise
+from vlnhijack.experiments.attack_stage import attack
+from vlnhijack.experiments.baseline import baseline
+from vlnhijack.experiments.config import ExperimentConfig
+from vlnhijack.experiments.context import Context, load_context
+from vlnhijack.experiments.evaluation_stage import evaluate
+from vlnhijack.experiments.instances import draw, pick
+from vlnhijack.experiments.pictures import illustrate
+from vlnhijack.experiments.yaml_config import load_config, save_config
+from vlnhijack.threat import AttackInstance
+
+_PACKAGES = ("vlnhijack", "torch", "mitsuba", "drjit", "numpy", "xatlas", "trimesh")
+
+
+def run(config: ExperimentConfig, folder: Path, *, resume: bool, progress: Progress) -> dict[str, Any]:
+    """Run all stages that have no result in `folder` yet; the summary.
+
+    Raises InputError where the folder holds a run that may not be continued, CheckError where the
+    baseline gate or an apply check fails.
+    """
+    open_folder(config, folder, resume=resume)
+    torch.set_num_threads(config.threads)
+    context = load_context(config, folder, progress)
+    instances = make_instances(context)
+    write_json(folder / "instances.json", [asdict(instance) for instance in instances])
+    seconds = {"baseline": sum(baseline(context, scan) for scan in used_scans(instances))}
+    seconds |= {"attack": 0.0, "evaluation": 0.0}
+    frames = []
+    for instance in instances:
+        seconds["attack"] += attack(context, instance)
+        frame, taken = evaluate(context, instance)
+        seconds["evaluation"] += taken
+        illustrate(context, instance, frame)
+        frames.append(frame)
+    records = pd.concat(frames, ignore_index=True)
+    save_records(folder / "records.parquet", records)
+    summary = {**summarise(records), "seconds": seconds}
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def open_folder(config: ExperimentConfig, folder: Path, *, resume: bool) -> None:
+    """Start a run folder, or check that the one there is the same run and may be continued."""
+    saved = folder / "config.yaml"
+    if saved.exists():
+        if not resume:
+            raise InputError(file=folder, expected="no earlier run (or --resume)", received="one")
+        if load_config(saved, ExperimentConfig) != config:
+            raise InputError(file=saved, expected="the settings of this run", received="others")
+        return
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(file=folder, expected="an empty or new folder", received="other files")
+    save_config(saved, config)
+    write_json(folder / "environment.json", environment(config))
+
+
+def environment(config: ExperimentConfig) -> dict[str, Any]:
+    """Versions, machine, threads and seed: what the numbers hang on."""
+    return {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "packages": {name: _version(name) for name in _PACKAGES},
+        "threads": config.threads,
+        "seed": config.seed,
+    }
+
+
+def make_instances(context: Context) -> list[AttackInstance]:
+    """The experiment's instances: picked by hand, or drawn by the seed."""
+    wanted, rules, seed = context.config.instances, context.config.rules, context.config.seed
+    if isinstance(wanted, list):
+        return [pick(context.scans[picked.house], picked, rules, seed) for picked in wanted]
+    scans = list(context.scans.values())
+    return draw(scans, wanted.kind, wanted.count, rules, seed)
+
+
+def used_scans(instances: Sequence[AttackInstance]) -> list[str]:
+    return sorted({instance.scan for instance in instances})
+
+
+def print_summary(console: Console, config: ExperimentConfig, folder: Path) -> None:
+    """The table of condition Test, percent with 95 % intervals."""
+    summary = read_json(folder / "summary.json")
+    table = Table(title=f"{config.name}: condition Test, % [95 % interval]", caption=config.note)
+    for column in ("attack", "measure", "n", "clean", "noise", "attacked"):
+        table.add_column(column, justify="left" if column in ("attack", "measure") else "right")
+    for row in rows_for_print(summary):
+        table.add_row(*row)
+    console.print(table)
+    seconds = {stage: round(taken) for stage, taken in summary["seconds"].items()}
+    console.print(f"seconds: {json.dumps(seconds)}; everything is in {folder}")
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

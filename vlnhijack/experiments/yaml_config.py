@@ -1,0 +1,75 @@
+"""YAML files checked against pydantic models: unknown keys and wrong types are errors."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vlnhijack.artifacts import write_text
+from vlnhijack.errors import InputError
+
+
+class Settings(BaseModel):
+    """A frozen group of settings; keys that are not its own are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+Config = TypeVar("Config", bound=Settings)
+
+
+def load_config(file: Path, model: type[Config], overrides: Sequence[str] = ()) -> Config:
+    """Read `file`, apply `key.sub=value` overrides (values are YAML), and validate.
+
+    Raises InputError that names file, key, expected and received.
+    """
+    values = _read(file)
+    for override in overrides:
+        _override(values, override)
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise _first_error(file, error) from None
+
+
+def save_config(path: Path, config: Settings) -> None:
+    """Write the resolved settings, defaults included."""
+    write_text(path, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        values = yaml.safe_load(file.read_text())
+    except FileNotFoundError:
+        raise InputError(file=file, expected="a YAML file", received="no such file") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"not valid YAML ({error})", file=file) from None
+    if not isinstance(values, dict):
+        raise InputError(file=file, expected="keys and values", received=type(values).__name__)
+    return values
+
+
+def _override(values: dict[str, Any], override: str) -> None:
+    key, equals, text = override.partition("=")
+    if not equals or not key:
+        raise InputError(field="--set", expected="key=value", received=override)
+    *parents, last = key.split(".")
+    place: Any = values
+    for parent in parents:
+        place = place.setdefault(parent, {}) if isinstance(place, dict) else None
+    if not isinstance(place, dict):
+        raise InputError(field="--set", expected="keys of nested settings", received=key)
+    try:
+        place[last] = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise InputError(field=f"--set {key}", expected="a YAML value", received=text) from None
+
+
+def _first_error(file: Path, error: ValidationError) -> InputError:
+    first = error.errors()[0]
+    field = ".".join(map(str, first["loc"]))
+    if first["type"] == "extra_forbidden":
+        return InputError(file=file, field=field, expected="no such key", received=first["input"])
+    return InputError(file=file, field=field, expected=first["msg"], received=first["input"])
