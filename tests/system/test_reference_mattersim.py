@@ -12,13 +12,15 @@ import pytest
 
 from vlnhijack.errors import InputError
 from vlnhijack.navigation.candidates import candidates
+from vlnhijack.navigation.episode import load_episodes, save_episodes
 from vlnhijack.navigation.graph import NavigationGraph, load_graph
 from vlnhijack.navigation.metrics import path_metrics
 from vlnhijack.navigation.views import VIEWS, angle_features, view_angles
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 REFERENCE = Path(os.environ.get("VLNHIJACK_REFERENCE", SHARED / "reference")) / "mattersim"
-DATA = Path(os.environ.get("VLNHIJACK_DATA", SHARED / "data")) / "r2r" / "connectivity.tar.gz"
+R2R = Path(os.environ.get("VLNHIJACK_DATA", SHARED / "data")) / "r2r"
+DATA = R2R / "connectivity.tar.gz"
 NAMES = {
     "nav_error": "navigation_error",
     "oracle_error": "oracle_error",
@@ -110,3 +112,16 @@ def test_metrics_at_the_edges_match_or_explain() -> None:
                 path_metrics(graph, record["prediction"], record["reference"])
         else:
             check_scores(graph, record)
+
+
+def test_room_to_room_loads_unchanged(connectivity: Path, tmp_path: Path) -> None:
+    source, file = R2R / "R2R_val_seen.json.gz", tmp_path / "R2R_val_seen.json"
+    if not source.is_file():
+        pytest.skip(f"no Room-to-Room episodes at {source} (VLNHIJACK_DATA)")
+    file.write_bytes(gzip.decompress(source.read_bytes()))
+    records = json.loads(file.read_text())
+    graphs = {scan: load_graph(connectivity, scan) for scan in {r["scan"] for r in records}}
+    episodes = load_episodes(file, graphs)
+    assert [e.instruction for e in episodes] == [t for r in records for t in r["instructions"]]
+    save_episodes(tmp_path / "again.json", episodes)
+    assert load_episodes(tmp_path / "again.json", graphs) == episodes

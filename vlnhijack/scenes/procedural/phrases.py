@@ -26,13 +26,13 @@ _OBJECTS = {
     "desk": ("desk", "writing desk"),
     "nightstand": ("nightstand", "bedside table"),
     "coat_stand": ("coat stand", "coat rack"),
-    "piano": ("piano", "keyboard"),
+    "piano": ("piano",),
     "stool": ("stool", "footstool"),
     "bench": ("bench",),
     "fridge": ("fridge", "refrigerator"),
     "stove": ("stove", "oven", "cooker"),
     "counter": ("counter", "countertop", "worktop"),
-    "sink": ("sink", "kitchen sink"),
+    "sink": ("sink",),
     "washbasin": ("washbasin", "basin"),
     "toilet": ("toilet",),
     "bathtub": ("bathtub", "tub", "bath"),
@@ -130,7 +130,10 @@ GRAMMAR: Mapping[str, tuple[str, ...]] = {
 
 
 def word_groups() -> tuple[dict[str, str], dict[str, str]]:
-    """Object words and room words, each mapped to its category or label."""
+    """Object words and room words, each mapped to its category or label.
+
+    Some words are parts of others ("lamp", "table lamp"): look for the longest first.
+    """
     return dict(OBJECT_WORDS), dict(ROOM_WORDS)
 
 
