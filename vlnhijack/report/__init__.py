@@ -1,0 +1,1 @@
+"""Pictures of results: reads what the stages wrote, computes nothing."""
