@@ -176,10 +176,12 @@ def leaves(rng: np.random.Generator, colour: Colour | None = None) -> Material:
 
     def evaluate(points: Array, normals: Array) -> Array:
         radius = np.hypot(points[:, 0], points[:, 1])
-        inside = np.clip(radius / max(np.quantile(radius, 0.8), 1e-3), 0, 1)
+        height = points[:, 2] / max(points[:, 2].max(), 1e-3)
+        reach = radius / max(float(np.quantile(radius, 0.8)), 1e-3)
+        inside = np.clip(np.maximum(reach, height**3), 0, 1)
         spots = fractal(points, 0.10, seed, 3)
         up = 0.5 + 0.5 * normals[:, 2]
-        colour = mix(base * 0.75, tip, 0.15 + 0.75 * inside * spots + 0.25 * up - 0.1)
+        colour = mix(base * 0.75, tip, 0.05 + 0.75 * inside * spots + 0.25 * up)
         return legal(colour * (0.5 + 0.55 * inside)[:, None])
 
     return evaluate

@@ -20,7 +20,7 @@ def bed(rng: np.random.Generator, large: bool) -> Piece:
     else:
         panel = cushion(width + 0.1, 0.12, head - 0.1, 0.05, (0.0, -length / 2 - 0.02, 0.1))
         board = Part(panel, upholstery(rng))
-    foot = box(width + 0.06, 0.04, rng.uniform(0.38, 0.6), (0.0, length / 2 + 0.02, 0.05))
+    foot = box(width + 0.08, 0.04, rng.uniform(0.38, 0.6), (0.0, length / 2 + 0.02, 0.05))
     mattress = cushion(width - 0.02, length - 0.04, 0.24, 0.06, (0.0, 0.0, 0.3))
     white = (0.90, 0.89, 0.86)
     duvet = cushion(width + 0.06, 1.3, 0.24, 0.07, (0.0, 0.31, 0.36), 0.03)

@@ -84,13 +84,11 @@ def curtain(rng: np.random.Generator, large: bool) -> Piece:
 
 
 def _drape(width: float, height: float) -> Mesh:
-    x = np.linspace(width / 2, -width / 2, 25)
+    x = np.linspace(-width / 2, width / 2, 25)
     wave = 0.04 * np.cos(np.arange(25) * np.pi / 2)
-    front = np.stack([x, 0.02 + wave, 0 * x], axis=-1)
-    rear = front[::-1] - np.array([0.0, 0.02, 0.0])
-    ring = np.concatenate([front, rear])
-    levels = [(0.0, 1.0), (0.5 * height, 0.96), (height, 0.94)]
-    return loft([ring * (s, 1.0, 1.0) + np.array([0.0, 0.0, z]) for z, s in levels])
+    section = np.array([(0.0, 0.0), (0.02, 0.0), (0.02, height), (0.0, height)])
+    ring = np.broadcast_to(section, (25, 4, 2)) + np.stack([wave, 0 * wave], axis=-1)[:, None]
+    return loft(np.concatenate([np.broadcast_to(x[:, None, None], (25, 4, 1)), ring], axis=-1))
 
 
 def fireplace(rng: np.random.Generator, large: bool) -> Piece:
@@ -102,7 +100,7 @@ def fireplace(rng: np.random.Generator, large: bool) -> Piece:
     lintel = box(width - 0.02, depth - 0.02, 0.28, (0.0, 0.0, height - 0.28))
     shelf = box(width + 0.16, depth + 0.12, 0.06, (0.0, 0.03, height - 0.02))
     hearth = box(width + 0.1, depth + 0.25, 0.05, (0.0, 0.1, -0.0))
-    rear = box(width - 0.1, 0.06, height - 0.1, (0.0, -depth / 2 + 0.04, 0.02))
+    rear = box(width - 0.1, 0.05, height - 0.1, (0.0, -depth / 2 + 0.04, 0.02))
     logs = [
         cylinder(0.045, 0.5, sides=8).turned("y", np.pi / 2).moved(-0.25, y, z)
         for y, z in ((-0.03, 0.1), (0.07, 0.1), (0.02, 0.18))

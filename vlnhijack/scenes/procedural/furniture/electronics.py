@@ -66,7 +66,7 @@ def _low_cabinet(rng: np.random.Generator, width: float, height: float) -> list[
     ]
     knobs = [box(0.12, 0.03, 0.015, (x * width / 3, 0.215, height - 0.08)) for x in (-1, 0, 1)]
     return [
-        gaps(width - 0.02, height - 0.14, 0.2, 0.12),
+        gaps(width - 0.04, height - 0.15, 0.2, 0.125),
         Part(join([body, legs(width - 0.1, 0.36, 0.12, 0.05)]), wood(rng, colour, 0)),
         Part(join(doors), wood(rng, shade(colour, 1.12), 0)),
         Part(join(knobs), metal(rng)),
@@ -117,12 +117,12 @@ def piano(rng: np.random.Generator, large: bool) -> Piece:
     gloss = solid((0.07, 0.06, 0.06)) if rng.random() < 0.6 else wood(rng, (0.4, 0.2, 0.12))
     body = box(1.45, 0.34, 1.18, (0.0, -0.15, 0.02))
     lid = box(1.5, 0.4, 0.03, (0.0, -0.14, 1.19))
-    bed = box(1.45, 0.36, 0.1, (0.0, 0.12, 0.58))
-    cheeks = [box(0.07, 0.36, 0.18, (x, 0.12, 0.6)) for x in (-0.7, 0.7)]
+    bed = box(1.44, 0.36, 0.1, (0.0, 0.12, 0.58))
+    cheeks = [box(0.07, 0.37, 0.18, (x, 0.12, 0.6)) for x in (-0.7, 0.7)]
     posts = [taper((0.06, 0.06), (0.09, 0.09), 0.62, (x, 0.24, 0.0)) for x in (-0.66, 0.66)]
     keys = box(1.3, 0.16, 0.02, (0.0, 0.2, 0.675))
     black = [
-        box(0.024, 0.09, 0.02, (-0.6 + 0.0366 * i, 0.165, 0.69))
+        box(0.024, 0.09, 0.02, (-0.6 + 0.0366 * i, 0.172, 0.69))
         for i in range(34)
         if i % 7 not in (2, 6)
     ]

@@ -40,7 +40,7 @@ def fridge(rng: np.random.Generator, large: bool) -> Piece:
     split = height * rng.uniform(0.32, 0.42) if rng.random() < 0.6 else height * 0.66
     front = depth / 2
     body = box(width, depth - 0.06, height - 0.04, (0.0, -0.03, 0.04))
-    foot = box(width - 0.06, depth - 0.12, 0.05)
+    foot = box(width - 0.06, depth - 0.14, 0.05)
     leaves = [
         cushion(width, 0.08, split - 0.06, 0.02, (0.0, front - 0.02, 0.05)),
         cushion(width, 0.08, height - split - 0.01, 0.02, (0.0, front - 0.02, split + 0.005)),
@@ -53,10 +53,10 @@ def fridge(rng: np.random.Generator, large: bool) -> Piece:
         grips.append(sweep(path, 0.012, 6))
     notes = [
         Part(
-            box(0.09, 0.01, 0.11, (float(rng.uniform(-0.2, 0.2)), front + 0.021, float(z))),
+            box(0.09, 0.01, 0.11, (rng.uniform(-0.2, 0.2), front + 0.021 + 0.002 * i, z)),
             solid(pick(rng, [(0.92, 0.85, 0.35), (0.9, 0.5, 0.55), (0.5, 0.75, 0.9)])),
         )
-        for z in rng.uniform(split + 0.2, height - 0.25, rng.integers(0, 4))
+        for i, z in enumerate(rng.uniform(split + 0.2, height - 0.25, rng.integers(0, 4)))
     ]
     return assemble(
         "fridge",
@@ -74,7 +74,7 @@ def stove(rng: np.random.Generator, large: bool) -> Piece:
     coat = metal(rng, STEEL) if rng.random() < 0.5 else solid(pick(rng, PAINTS))
     dark = solid((0.07, 0.07, 0.08))
     body = box(width, depth, height - 0.01)
-    splash = box(width, 0.04, 0.14, (0.0, -front + 0.02, height - 0.02))
+    splash = box(width - 0.01, 0.04, 0.14, (0.0, -front + 0.025, height - 0.02))
     hob = box(width - 0.03, depth - 0.06, 0.02, (0.0, 0.01, height - 0.015))
     oven = cushion(width - 0.05, 0.04, 0.48, 0.015, (0.0, front, 0.22))
     drawer = cushion(width - 0.05, 0.04, 0.14, 0.012, (0.0, front, 0.05))

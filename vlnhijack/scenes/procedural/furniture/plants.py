@@ -12,11 +12,7 @@ GOLDEN = np.pi * (3 - np.sqrt(5))
 def plant(rng: np.random.Generator, large: bool) -> Piece:
     """A potted plant; large: 1.5-1.9 m with a dense crown of broad leaves."""
     if large:
-        return (
-            _bush(rng)
-            if rng.random() < 0.6
-            else _palm(rng, rng.uniform(0.9, 1.1), rng.uniform(0.65, 0.8))
-        )
+        return _palm(rng, rng.uniform(0.9, 1.1), 0.8) if rng.random() < 0.15 else _bush(rng)
     kind = rng.integers(3)
     if kind == 0:
         return _palm(rng, rng.uniform(0.1, 0.4), rng.uniform(0.4, 0.55))
@@ -43,18 +39,18 @@ def _aim(blade: Mesh, around: float, up: float, at: tuple[float, float, float]) 
 
 def _bush(rng: np.random.Generator) -> Piece:
     """Three or four stems in a large pot that carry broad leaves from bottom to top."""
-    height, spread = rng.uniform(1.65, 1.95), rng.uniform(0.42, 0.54)
+    height, spread = rng.uniform(1.65, 1.9), rng.uniform(0.5, 0.6)
     pot = rng.uniform(0.3, 0.4)
-    count, width = int(rng.integers(80, 100)), rng.uniform(0.22, 0.31)
+    count, width = int(rng.integers(92, 104)), rng.uniform(0.24, 0.34)
     blades = []
     for i in range(count):
         t = (i + 0.5) / count
         around = GOLDEN * i + rng.uniform(-0.3, 0.3)
         z = pot + 0.02 + (height - pot - 0.22) * t
-        bulge = np.sin(np.pi * (0.22 + 0.68 * t))
-        out = spread * bulge * rng.uniform(0.3, 0.75)
+        bulge = np.sin(np.pi * (0.25 + 0.6 * t))
+        out = spread * bulge * rng.uniform(0.25, 0.75)
         at = (-out * np.sin(around), out * np.cos(around), z)
-        size = rng.uniform(0.32, 0.42)
+        size = rng.uniform(0.34, 0.44)
         blade = leaf(size, width * rng.uniform(0.8, 1.15), rng.uniform(0.6, 1.2), segments=3)
         blades.append(_aim(blade, around, rng.uniform(0.1, 0.7) + 0.6 * t, at))
     stems = []

@@ -83,7 +83,7 @@ def _wooden_chair(rng: np.random.Generator) -> Piece:
             back.append(bar((x, rear, seat), (x, rear - tilt, top - 0.03), 0.011, 6))
         back.append(box(width, 0.025, 0.09, (0.0, rear - tilt, top - 0.08)))
     apron = box(width - 0.06, depth - 0.06, 0.06, (0.0, 0.0, seat - 0.07))
-    wooden = join([legs(width, depth, seat - 0.01, thick), apron, *posts, *back])
+    wooden = join([legs(width, depth, seat - 0.013, thick), apron, *posts, *back])
     plate = cushion(width, depth, 0.035, 0.015, (0.0, 0.0, seat - 0.015))
     parts = [Part(wooden, frame), Part(plate, frame)]
     if rng.random() < 0.5:
@@ -150,7 +150,7 @@ def _seat_frame(
         rest = cushion(room - 0.01, thick, height - level, 0.08).turned("x", 0.18)
         loose.append(rest.moved(x, -depth / 2 + 0.31, level))
         if long:
-            pad = cushion(room, 0.9, level - foot - 0.1, 0.04, (x, depth / 2 + 0.08, foot))
+            pad = cushion(room, 0.9, level - foot - 0.1, 0.04, (x, depth / 2 + 0.08, foot - 0.01))
             soft.append(pad)
             soft.append(box(0.05, 0.05, foot + 0.05, (x - 0.2, depth / 2 + long - 0.1, 0.0)))
     feet = legs(width - 0.1, depth - 0.1, foot + 0.03, 0.06, 0.01)
@@ -165,8 +165,8 @@ def _pillow(rng: np.random.Generator, at: Point) -> Part:
 
 
 def _armchair(rng: np.random.Generator) -> Piece:
-    width, depth = rng.uniform(0.88, 1.05), rng.uniform(0.85, 0.98)
-    height = rng.uniform(0.9, 1.15)
+    width, depth = rng.uniform(0.95, 1.1), rng.uniform(0.88, 1.0)
+    height = rng.uniform(0.92, 1.2)
     parts = _seat_frame(rng, width, depth, height, 1, False)
     if height > 1.0:
         wings = [
@@ -185,8 +185,8 @@ def sofa(rng: np.random.Generator, large: bool) -> Piece:
     width, depth = seats * rng.uniform(0.62, 0.7) + 0.3, rng.uniform(0.86, 1.0)
     height = rng.uniform(0.82, 0.98)
     parts = _seat_frame(rng, width, depth, height, seats, bool(large and rng.random() < 0.5))
-    for x in rng.permutation([-0.36, 0.36, 0.22, -0.2])[: rng.integers(0, 4)]:
-        parts.append(_pillow(rng, (float(x * width), -depth / 2 + 0.48, 0.5)))
+    for i, x in enumerate(rng.permutation([-0.36, 0.36, 0.22, -0.2])[: rng.integers(0, 4)]):
+        parts.append(_pillow(rng, (float(x * width), -depth / 2 + 0.46 + 0.03 * i, 0.5)))
     return assemble("sofa", *parts)
 
 

@@ -227,12 +227,10 @@ def coat_stand(rng: np.random.Generator, large: bool) -> Piece:
         for a in np.arange(6) * np.pi / 3
     ]
     coat = [(0.16, 0.55), (0.17, 0.6), (0.14, 1.1), (0.15, 1.4), (0.05, 1.62)]
+    hung = lathe(coat, 10).scaled(1.0, 0.5, 1.0)
+    around = rng.choice(np.arange(6) * np.pi / 3, 2, replace=False)
     coats = [
-        Part(lathe(coat, 10).scaled(1.0, 0.5, 1.0).moved(0.0, 0.16).turned("z", a), fabric_of(rng))
-        for a in rng.choice(np.arange(6) * np.pi / 3, 2, replace=False)
+        Part(hung.moved(0.0, 0.16, 0.03 * i).turned("z", angle), solid(pick(rng, FABRICS)))
+        for i, angle in enumerate(around)
     ]
     return assemble("coat_stand", Part(join([pole, *hooks]), wood(rng)), *coats)
-
-
-def fabric_of(rng: np.random.Generator) -> Material:
-    return solid(pick(rng, FABRICS))

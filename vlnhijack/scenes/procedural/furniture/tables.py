@@ -145,7 +145,7 @@ def _cloth(width: float, depth: float, height: float, drop: float) -> Mesh:
         dense.append(a)
         if np.linalg.norm(b - a) > 0.3:
             dense += [a + (b - a) * t for t in side]
-    outline = np.array(dense)
+    outline = np.roll(dense, -2, axis=0)
     outward = outline / np.linalg.norm(outline, axis=1, keepdims=True)
     wave = np.where(np.arange(len(outline)) % 2, 0.035, -0.015)[:, None] * outward
     up = np.array([0.0, 0.0, 1.0])
@@ -194,7 +194,7 @@ def desk(rng: np.random.Generator, large: bool) -> Piece:
         Part(join(drawers), wood(rng, axis=0) if rng.random() < 0.4 else timber),
         Part(join(knobs), metal(rng)),
     ]
-    lid = box(0.34, 0.012, 0.23).turned("x", 0.25).moved(-0.1, -0.12, height + 0.015)
+    lid = box(0.334, 0.012, 0.23).turned("x", 0.25).moved(-0.1, -0.12, height + 0.015)
     screen = box(0.31, 0.006, 0.2).turned("x", 0.25).moved(-0.1, -0.112, height + 0.03)
     keyboard = box(0.34, 0.24, 0.015, (-0.1, 0.0, height + 0.008))
     parts += [
