@@ -57,9 +57,10 @@ def pixel_means(channels: Iterable[Any], spp: int) -> NDArray[np.float32]:
     """Means (pixels, C) over the `spp` samples of every pixel of C Dr.Jit Floats."""
     import drjit as dr
 
-    sums = [dr.block_sum(channel, spp) for channel in channels]
-    dr.eval(sums)
-    return np.stack([np.array(total) for total in sums], -1) / np.float32(spp)
+    samples = list(channels)
+    dr.eval(samples)
+    sums = [np.array(dr.block_sum(channel, spp), np.float32) for channel in samples]
+    return np.stack(sums, -1) / np.float32(spp)
 
 
 @cache
