@@ -168,17 +168,15 @@ def metal(rng: np.random.Generator, colour: Colour | None = None) -> Material:
     return evaluate
 
 
-def leaves(rng: np.random.Generator, colour: Colour | None = None) -> Material:
-    """Foliage: leaf-sized patches of several greens, darker inside the plant, light above."""
-    base = np.array(colour or pick(rng, GREENS, 0.04))
+def leaves(rng: np.random.Generator, spread: float, top: float) -> Material:
+    """Foliage round the z axis: several greens, darker inside than `spread` m, light at `top` m."""
+    base = np.array(pick(rng, GREENS, 0.04))
     tip = np.clip(base * 1.35 + (0.10, 0.12, 0.0), 0, 0.9)
     seed = seed_from(rng)
 
     def evaluate(points: Array, normals: Array) -> Array:
         radius = np.hypot(points[:, 0], points[:, 1])
-        height = points[:, 2] / max(points[:, 2].max(), 1e-3)
-        reach = radius / max(float(np.quantile(radius, 0.8)), 1e-3)
-        inside = np.clip(np.maximum(reach, height**3), 0, 1)
+        inside = np.clip(np.maximum(radius / spread, (points[:, 2] / top) ** 3), 0, 1)
         spots = fractal(points, 0.10, seed, 3)
         up = 0.5 + 0.5 * normals[:, 2]
         colour = mix(base * 0.75, tip, 0.05 + 0.75 * inside * spots + 0.25 * up)

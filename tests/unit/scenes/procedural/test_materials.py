@@ -14,7 +14,7 @@ MAKERS: dict[str, Maker] = {
     "fabric": materials.fabric,
     "leather": materials.leather,
     "metal": materials.metal,
-    "leaves": materials.leaves,
+    "leaves": lambda rng: materials.leaves(rng, 0.5, 1.0),
     "ceramic": materials.ceramic,
     "glazed": materials.glazed,
     "marble": materials.marble,
@@ -45,6 +45,8 @@ def test_colours_are_albedos_and_repeat(name: str) -> None:
         again = MAKERS[name](np.random.default_rng(seed))(points, normals)
         assert first.shape == (500, 3)
         assert np.array_equal(first, again)
+        part = MAKERS[name](np.random.default_rng(seed))(points[:7], normals[:7])
+        assert np.allclose(first[:7], part), "a colour depends on the other points"
         assert first.min() >= 0.03
         assert first.max() <= 0.95
 

@@ -63,7 +63,7 @@ def _bush(rng: np.random.Generator) -> Piece:
         "plant",
         *_pot(rng, rng.uniform(0.2, 0.26), pot),
         Part(join(stems), wood(rng, (0.35, 0.26, 0.16))),
-        Part(join(blades), leaves(rng)),
+        Part(join(blades), leaves(rng, spread, height)),
     )
 
 
@@ -84,7 +84,7 @@ def _palm(rng: np.random.Generator, trunk: float, reach: float) -> Piece:
         "plant",
         *_pot(rng, 0.14 + 0.07 * trunk, pot),
         Part(sweep(path, [wide, 0.6 * wide], 8), wood(rng, (0.4, 0.3, 0.18))),
-        Part(join(blades), leaves(rng)),
+        Part(join(blades), leaves(rng, 0.6 * reach, pot + trunk + 0.5 * reach)),
     )
 
 
@@ -99,7 +99,9 @@ def _rosette(rng: np.random.Generator) -> Piece:
         at = (-out * np.sin(around), out * np.cos(around), z)
         blade = leaf(rng.uniform(0.18, 0.26), rng.uniform(0.12, 0.17), 0.9, segments=4)
         blades.append(_aim(blade, around, 0.3 + 0.8 * t, at))
-    return assemble("plant", *_pot(rng, 0.15, pot), Part(join(blades), leaves(rng)))
+    return assemble(
+        "plant", *_pot(rng, 0.15, pot), Part(join(blades), leaves(rng, 0.22, pot + 0.5))
+    )
 
 
 def _sword_plant(rng: np.random.Generator) -> Piece:
@@ -112,4 +114,6 @@ def _sword_plant(rng: np.random.Generator) -> Piece:
         size = tall * rng.uniform(0.7, 1.1)
         blade = leaf(size, rng.uniform(0.08, 0.11), rng.uniform(0, 0.3), segments=5, fold=0.25)
         blades.append(_aim(blade, around, np.pi / 2 - rng.uniform(0.0, 0.3), at))
-    return assemble("plant", *_pot(rng, 0.15, pot), Part(join(blades), leaves(rng)))
+    return assemble(
+        "plant", *_pot(rng, 0.15, pot), Part(join(blades), leaves(rng, 0.15, pot + tall))
+    )

@@ -76,7 +76,7 @@ def _vase(rng: np.random.Generator, z: float) -> list[Part]:
         heads.append(lathe(bloom, 7, (x, y, z + rng.uniform(0.34, 0.46))))
     return [
         Part(lathe(profile, 12, (0.0, 0.0, z)), glazed(rng)),
-        Part(join(stems), leaves(rng)),
+        Part(join(stems), leaves(rng, 0.06, z + 0.4)),
         Part(join(heads), solid(pick(rng, FLOWERS))),
     ]
 
