@@ -136,8 +136,8 @@ def _doorways(
             graph.add_edge(*pair, weight=private + float(rng.random()), shared=shared)
     tree = nx.minimum_spanning_tree(graph)
     loops = sorted(set(graph.edges) - set(tree.edges), key=lambda e: graph.edges[e]["weight"])
-    wanted = [edge for edge in loops if graph.edges[edge]["weight"] < 0.75]
-    chosen = [*tree.edges, *(wanted if len(wanted) > 1 else loops[:2])]
+    wanted = [edge for edge in loops if graph.edges[edge]["weight"] < 0.85]
+    chosen = [*tree.edges, *(wanted if len(wanted) > 2 else loops[:3])]
     return tuple(_doorway(edge, graph.edges[edge]["shared"], rng) for edge in chosen)
 
 

@@ -61,11 +61,15 @@ def _graph(
     shells: Sequence[Shell],
 ) -> NavigationGraph | None:
     obstacles = np.array([p.box[[0, 1, 3, 4]] for p in placements if p.blocks])
-    landmarks = [p.front for p in placements if p.large and p.piece.category in ATTACKABLE]
-    meshes = [trimesh.Trimesh(shell.vertices, shell.faces, process=False) for shell in shells]
-    meshes += [trimesh.Trimesh(p.vertices, p.piece.mesh.faces, process=False) for p in placements]
-    mesh = trimesh.util.concatenate(meshes)
-    return make_graph(name, seed, plan, obstacles, np.array(landmarks).reshape(-1, 3), mesh)
+    shapes = [trimesh.Trimesh(shell.vertices, shell.faces, process=False) for shell in shells]
+    pieces = [trimesh.Trimesh(p.vertices, p.piece.mesh.faces, process=False) for p in placements]
+    landmarks = [
+        mesh
+        for mesh, placement in zip(pieces, placements, strict=True)
+        if placement.piece.category in ATTACKABLE
+    ]
+    mesh = trimesh.util.concatenate(shapes + pieces)
+    return make_graph(name, seed, plan, obstacles, landmarks, mesh)
 
 
 def _assemble(

@@ -10,12 +10,11 @@ from vlnhijack.scenes.procedural.furniture import ATTACKABLE
 from vlnhijack.scenes.procedural.room_layout import Placement, RoomLayout
 
 FEWEST_OF_EACH = 3
-FEWEST, MOST = 30, 40
-SMALL_ROOMS = ("bathroom", "hallway")
+FEWEST = 32
 
 
 def furnish(plan: FloorPlan, rng: np.random.Generator) -> list[Placement]:
-    """About 30-40 pieces; at least three of each attackable category where there is room."""
+    """At least 32 pieces; at least three of each attackable category where there is room."""
     rooms = [RoomLayout(plan, index, rng) for index in range(len(plan.rooms))]
     for room in rooms:
         RECIPES[room.room.label](room)
@@ -24,24 +23,20 @@ def furnish(plan: FloorPlan, rng: np.random.Generator) -> list[Placement]:
 
 
 def _top_up(rooms: list[RoomLayout], rng: np.random.Generator) -> None:
-    """Add attackable categories that are rare, then anything, until the house is full enough."""
-    for _ in range(80):
+    """Add attackable pieces, rare categories first, until there are enough."""
+    habitable = [room for room in rooms if room.room.label not in ("bathroom", "hallway")]
+    for _ in range(60):
         counts = Counter(p.piece.category for room in rooms for p in room.placed)
-        rare = min(ATTACKABLE, key=lambda category: counts[category])
-        if counts.total() >= MOST or (counts.total() >= FEWEST and counts[rare] >= FEWEST_OF_EACH):
+        rare = [name for name in ATTACKABLE if counts[name] < FEWEST_OF_EACH]
+        if not rare and counts.total() >= FEWEST:
             return
-        choices = [
-            r for r in rooms if r.room.label not in SMALL_ROOMS or rare in ("plant", "cabinet")
-        ]
-        room = choices[rng.integers(len(choices))]
-        _add(room, rare, large=bool(rng.random() < 0.5))
-
-
-def _add(room: RoomLayout, category: str, *, large: bool) -> None:
-    if category == "tv_monitor":
-        _television(room)
-    else:
-        room.against_wall(category, large=large, corner=category in ("plant", "lamp"))
+        category = str(rng.choice(rare or ATTACKABLE))
+        room = habitable[rng.integers(len(habitable))]
+        if category == "tv_monitor":
+            _television(room)
+        else:
+            large = bool(rng.random() < 0.5)
+            room.against_wall(category, large=large, corner=category == "plant")
 
 
 def _hang(room: RoomLayout, category: str = "picture", *, large: bool = False) -> None:
@@ -56,11 +51,13 @@ def _television(room: RoomLayout, viewer: Placement | None = None) -> None:
             return room.opposite(viewer, category, large=large)
         return room.against_wall(category, large=large)
 
-    if room.rng.random() < 0.6 and put("tv_monitor", large=True) is not None:
+    if room.rng.random() < 0.7 and put("tv_monitor", large=True) is not None:
         return
-    cabinet = put("cabinet")
-    if cabinet is not None:
-        room.on_top(cabinet, "tv_monitor")
+    for _ in range(3):
+        cabinet = put("cabinet")
+        if cabinet is None or room.on_top(cabinet, "tv_monitor") is not None:
+            return
+        room.placed.remove(cabinet)
 
 
 def _living_room(room: RoomLayout) -> None:
@@ -87,12 +84,12 @@ def _dining_room(room: RoomLayout) -> None:
 
 
 def _kitchen(room: RoomLayout) -> None:
+    _table_with_chairs(room, 2, large=False)
     counter = room.against_wall("counter")
-    for category in ("stove", "sink", "fridge"):
+    for category in ("stove", "fridge", str(room.rng.choice(["sink", "cabinet"]))):
         if counter is None or room.beside(counter, category) is None:
             room.against_wall(category)
-    _table_with_chairs(room, 2, large=False)
-    room.against_wall("cabinet")
+    room.against_wall("cabinet", large=True)
     room.against_wall("plant", corner=True)
 
 
@@ -121,7 +118,7 @@ def _office(room: RoomLayout) -> None:
 
 
 def _bathroom(room: RoomLayout) -> None:
-    for category in ("bathtub", "toilet", "washbasin", "cabinet", "washing_machine"):
+    for category in ("bathtub", "toilet", "washbasin", "cabinet"):
         room.against_wall(category)
 
 
@@ -136,7 +133,9 @@ def _hallway(room: RoomLayout) -> None:
 
 def _table_with_chairs(room: RoomLayout, count: int, *, large: bool) -> None:
     """A table in the middle of the room or, where that blocks the way, at a wall."""
-    table = room.in_the_middle("table", large=large) or room.against_wall("table", large=large)
+    x0, y0, x1, y1 = room.room.bounds
+    table = room.in_the_middle("table", large=large) if min(x1 - x0, y1 - y0) > 3.7 else None
+    table = table or room.against_wall("table", large=large)
     if table is not None:
         room.around(table, "chair", count)
 

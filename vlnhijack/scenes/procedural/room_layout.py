@@ -49,13 +49,6 @@ class Placement:
         return turned.moved(*self.position).vertices
 
     @property
-    def front(self) -> Array:
-        """x, y of the middle of the front and the heading that it looks along."""
-        ahead, _ = _axes(self.heading)
-        middle = np.array(self.position[:2]) + self.piece.size[1] / 2 * ahead
-        return np.array([*middle, self.heading])
-
-    @property
     def blocks(self) -> bool:
         """Whether a walker has to go around it."""
         return self.box[5] > FLAT and self.box[2] < OVERHEAD

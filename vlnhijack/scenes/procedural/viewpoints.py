@@ -11,15 +11,14 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from vlnhijack.frames import direction
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.scenes.procedural.floor_plan import FloorPlan
+from vlnhijack.scenes.procedural.lookouts import lookouts
 from vlnhijack.seeds import stream
 
 EYE_HEIGHT = 1.5
 SPACING = 1.5
-LONGEST_STEP = 2.5
-LONGEST_BRIDGE = 2.9
+LONGEST_STEP = 2.9
 CLEARANCE = 0.25
 FEWEST, MOST = 32, 44
 ATTEMPTS = 8
@@ -33,37 +32,40 @@ def make_graph(
     seed: int,
     plan: FloorPlan,
     obstacles: Array,
-    landmarks: Array,
+    landmarks: Sequence[trimesh.Trimesh],
     mesh: trimesh.Trimesh,
 ) -> NavigationGraph | None:
-    """A connected graph of 34-44 viewpoints that reaches every room; None where there is none.
+    """A connected graph of 32-44 viewpoints that reaches every room, of eight drawn the one with
+    the most edges; None where there is none.
 
-    obstacles (B,4) are the boxes x0, y0, x1, y1 to stay clear of; landmarks (L,3) are x, y of the
-    middle of a front and the heading it looks along, of furniture to be seen from near; steps are
-    checked against `mesh` by casting rays.
+    obstacles (B,4) are the boxes x0, y0, x1, y1 to stay clear of; each of `landmarks` gets a
+    viewpoint, if there is a place, that sees it large; steps are checked against `mesh` by rays.
     """
     doorways = _doorway_centres(plan, obstacles)
     places = np.concatenate([doorways, standing_places(plan, obstacles)])
-    lookouts = [_lookouts(places, landmark) for landmark in landmarks]
+    eyes = np.column_stack([places, np.full(len(places), EYE_HEIGHT)])
+    near = [lookouts(eyes, piece, stream(seed, "lookouts")) for piece in landmarks]
+    best: tuple[Array, nx.Graph] | None = None
     for attempt in range(ATTEMPTS):
         rng = stream(seed, "viewpoints", attempt)
-        rows = _grow(places, len(doorways), lookouts, obstacles, mesh, rng)
-        chosen = places[rows]
-        graph = _steps(chosen, obstacles, mesh)
-        if (
-            len(rows) < FEWEST
-            or not _reaches_every_room(chosen, plan)
-            or not nx.is_connected(graph)
-        ):
+        chosen = places[_grow(places, len(doorways), near, obstacles, mesh, rng)]
+        if len(chosen) < FEWEST or not _reaches_every_room(chosen, plan):
             continue
-        return NavigationGraph(
-            name,
-            tuple(stream(seed, name, "viewpoint", row).bytes(16).hex() for row in graph),
-            np.column_stack([chosen, np.full(len(chosen), EYE_HEIGHT)]),
-            nx.to_numpy_array(graph, weight=None) > 0,
-            np.full(len(chosen), EYE_HEIGHT),
-        )
-    return None
+        graph = _steps(chosen, obstacles, mesh)
+        if nx.is_connected(graph) and (best is None or graph.size() > best[1].size()):
+            best = chosen, graph
+    return None if best is None else _navigation_graph(name, seed, *best)
+
+
+def _navigation_graph(name: str, seed: int, places: Array, graph: nx.Graph) -> NavigationGraph:
+    heights = np.full(len(places), EYE_HEIGHT)
+    return NavigationGraph(
+        name,
+        tuple(stream(seed, name, "viewpoint", row).bytes(16).hex() for row in range(len(places))),
+        np.column_stack([places, heights]),
+        nx.to_numpy_array(graph, nodelist=range(len(places)), weight=None) > 0,
+        heights,
+    )
 
 
 def standing_places(plan: FloorPlan, obstacles: Array, step: float = 0.1) -> Array:
@@ -111,20 +113,10 @@ def _doorway_centres(plan: FloorPlan, obstacles: Array) -> Array:
     return centres[distance_to_boxes(centres, obstacles) >= CLEARANCE]
 
 
-def _lookouts(places: Array, landmark: Array) -> NDArray[np.int64]:
-    """Rows (K,) of the places 0.5-1.1 m before a front's middle, those at 0.75 m first."""
-    offset = places - landmark[:2]
-    forward = offset @ direction(landmark[2])[:2]
-    aside = np.abs(offset @ direction(landmark[2] + np.pi / 2)[:2])
-    near = (forward > 0.5) & (forward < 1.1) & (aside < 0.4)
-    order = np.abs(forward - 0.75) + 0.5 * aside
-    return np.flatnonzero(near)[np.argsort(order[near], kind="stable")]
-
-
 def _grow(
     places: Array,
     doorways: int,
-    lookouts: Sequence[NDArray[np.int64]],
+    near: Sequence[NDArray[np.int64]],
     obstacles: Array,
     mesh: trimesh.Trimesh,
     rng: np.random.Generator,
@@ -132,22 +124,23 @@ def _grow(
     """Rows of places, each a walkable step from an earlier one.
 
     The first `doorways` places keep their surroundings free and are taken as soon as they are in
-    reach; then one place of each lookout; then the tightest packing that the spacing allows.
+    reach; then one place near each landmark; then the tightest packing that the spacing allows.
     """
     kept = _spaced(places, rng.permutation(doorways))
     gaps = np.linalg.norm(places[:, None] - places[kept], axis=-1).min(axis=1)
     gaps[kept] = np.inf
     reach = np.zeros(len(places), bool)
-    pending = [lookouts[index] for index in rng.permutation(len(lookouts))]
+    pending = [near[index] for index in rng.permutation(len(near))]
     chosen: list[int] = []
     row: int | None = kept[0]
     while row is not None and len(chosen) < MOST:
         chosen.append(row)
         distance = np.linalg.norm(places - places[row], axis=1)
         gaps = np.minimum(gaps, distance)
-        near = np.flatnonzero((distance <= LONGEST_BRIDGE) & (gaps >= SPACING) & ~reach)
-        pairs = np.stack([np.full(len(near), row), near], axis=-1)
-        reach[near] = _is_walkable(places, pairs, obstacles, mesh)
+        around = np.flatnonzero((distance <= LONGEST_STEP) & (gaps >= SPACING) & ~reach)
+        pairs = np.stack([np.full(len(around), row), around], axis=-1)
+        reach[around] = _is_walkable(places, pairs, obstacles, mesh)
+        pending = [rows for rows in pending if row not in rows]
         row = _next(reach & (gaps >= SPACING), kept, pending, gaps, rng)
     return chosen
 
@@ -162,10 +155,9 @@ def _next(
     for row in kept:
         if free[row]:
             return row
-    for index, lookout in enumerate(pending):
-        if free[lookout].any():
-            del pending[index]
-            return int(lookout[free[lookout]][0])
+    for rows in pending:
+        if free[rows].any():
+            return int(rows[free[rows]][0])
     if not free.any():
         return None
     order = gaps + rng.uniform(0, 0.15, len(gaps))
@@ -182,16 +174,16 @@ def _spaced(places: Array, rows: Iterable[int]) -> list[int]:
 
 
 def _steps(places: Array, obstacles: Array, mesh: trimesh.Trimesh) -> nx.Graph:
-    """Walkable steps of up to 2.5 m, and up to 2.9 m where they join what is apart."""
+    """Walkable steps of up to 2.9 m, short ones first, that pass no other viewpoint."""
     gaps = np.linalg.norm(places[:, None] - places, axis=-1)
-    pairs = [p for p in combinations(range(len(places)), 2) if gaps[p] <= LONGEST_BRIDGE]
+    pairs = [p for p in combinations(range(len(places)), 2) if gaps[p] <= LONGEST_STEP]
     pairs = [p for p in pairs if not _skips(places, *p)]
     free = _is_walkable(places, np.array(pairs), obstacles, mesh)
     graph = nx.Graph()
     graph.add_nodes_from(range(len(places)))
     for i, j in sorted((p for p, ok in zip(pairs, free, strict=True) if ok), key=lambda p: gaps[p]):
         crowded = max(graph.degree[i], graph.degree[j]) >= HIGHEST_DEGREE
-        if (gaps[i, j] <= LONGEST_STEP and not crowded) or not nx.has_path(graph, i, j):
+        if not crowded or not nx.has_path(graph, i, j):
             graph.add_edge(i, j)
     return graph
 
