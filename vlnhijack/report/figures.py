@@ -16,7 +16,16 @@ from vlnhijack.artifacts import atomic_path
 from vlnhijack.attack.optimise import Validation, best
 from vlnhijack.display import to_8bit
 from vlnhijack.errors import InputError
-from vlnhijack.report.style import ATTACKED, CLEAN, FAINT, INK, MUTED, RC, save_figure
+from vlnhijack.report.style import (
+    ATTACKED,
+    CLEAN,
+    FAINT,
+    INK,
+    MUTED,
+    RC,
+    save_figure,
+    save_overview,
+)
 
 Pixels = NDArray[np.float32]
 Rows = Sequence[Mapping[str, float]]
@@ -31,7 +40,9 @@ def save_image(path: Path, image: ArrayLike) -> None:
 
     Raises InputError for any other shape.
     """
-    _save(path, Image.fromarray(to_8bit(_pixels(image))))
+    picture = Image.fromarray(to_8bit(_pixels(image)))
+    with atomic_path(path) as temporary:
+        picture.save(temporary, optimize=True)
 
 
 def before_after(
@@ -39,8 +50,9 @@ def before_after(
 ) -> None:
     """Rows of views (3,h,w), one title each: before, after, amplified difference around grey.
 
-    One gain, printed above its column, serves all rows. Raises InputError where the lists differ
-    in length or the views in shape.
+    One gain, printed above its column, serves all rows. The picture has 256 colours; `save_image`
+    keeps the exact pixels. Raises InputError where the lists differ in length or the views in
+    shape.
     """
     if not len(before) == len(after) == len(titles) > 0:
         raise InputError(
@@ -61,13 +73,13 @@ def before_after(
     draw, bold = ImageDraw.Draw(sheet), _font(13, "bold")
     for column, head in enumerate(heads):
         draw.text((GUTTER + column * step, GUTTER), head, INK, bold)
-    _save(path, sheet)
+    save_overview(sheet, path)
 
 
 def contact_sheet(
     path: Path, images: ArrayLike, columns: int = 12, labels: Sequence[str] | None = None
 ) -> None:
-    """All views (V,3,h,w) as tiles of at most 160 pixels, row by row, with labels above.
+    """All views (V,3,h,w) as tiles of at most 160 pixels in 256 colours, with labels above.
 
     Raises InputError for another shape or another number of labels than images.
     """
@@ -77,7 +89,7 @@ def contact_sheet(
     if labels is not None and len(labels) != len(views):
         raise InputError(field="labels", expected=len(views), received=len(labels))
     tiles = [_tile(_pixels(view), 1, 160) for view in views]
-    _save(path, _grid(tiles, min(columns, len(views)), labels))
+    save_overview(_grid(tiles, min(columns, len(views)), labels), path)
 
 
 def curve(path: Path, log: Rows, validations: Rows) -> None:
@@ -182,8 +194,3 @@ def _column(rows: Rows, key: str) -> NDArray[np.float64]:
 
 def _font(size: int, weight: str) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(findfont(FontProperties(family="DejaVu Sans", weight=weight)), size)
-
-
-def _save(path: Path, picture: Image.Image) -> None:
-    with atomic_path(path) as temporary:
-        picture.save(temporary, optimize=True)

@@ -36,9 +36,13 @@ RC: dict[Any, Any] = {
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a PNG of 256 colours at 150 dpi, whole or not at all."""
+    """Write a figure as PNG at 150 dpi, whole or not at all."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
-    picture = Image.open(buffer).convert("RGB").quantize(256, Image.Quantize.MEDIANCUT)
+    save_overview(Image.open(buffer).convert("RGB"), path)
+
+
+def save_overview(picture: Image.Image, path: Path) -> None:
+    """Write an RGB picture as a PNG of 256 colours, a third of the size, whole or not at all."""
     with atomic_path(path) as temporary:
-        picture.save(temporary, optimize=True, dpi=(DPI, DPI))
+        picture.quantize(256).save(temporary, optimize=True, dpi=(DPI, DPI))

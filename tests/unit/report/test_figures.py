@@ -75,7 +75,8 @@ def test_contact_sheet_is_row_by_row(tmp_path: Path) -> None:
     assert pixels.shape == (2 * 78 + 6, 3 * 102 + 6, 3)
     for number, view in enumerate(VIEWS):
         y, x = 6 + 78 * (number // 3), 6 + 102 * (number % 3)
-        assert np.array_equal(pixels[y : y + 72, x : x + 96], levels(view))
+        error = np.abs(pixels[y : y + 72, x : x + 96].astype(int) - levels(view))
+        assert error.mean() < 15  # 256 colours for white noise; another view differs by 85
     with pytest.raises(InputError, match="labels"):
         contact_sheet(tmp_path / "a.png", VIEWS, labels=["one"])
 
