@@ -7,7 +7,8 @@ import typer
 from typer.core import TyperGroup
 
 from vlnhijack import __version__
-from vlnhijack.cli import doctor
+from vlnhijack.cli import agent, doctor, house
+from vlnhijack.cli.run import run
 from vlnhijack.errors import VlnHijackError
 
 
@@ -42,6 +43,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Hijack vision-and-language navigation agents by the texture of one object.",
 )
+app.command()(run)
+app.add_typer(house.app, name="house")
+app.add_typer(agent.app, name="agent")
 app.command()(doctor.doctor)
 
 

@@ -6,7 +6,8 @@ from vlnhijack.experiments.attack_stage import AttackFiles, read_rows
 from vlnhijack.experiments.context import Context
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.observe import render_views
-from vlnhijack.report.figures import before_after, curve, save_image, trajectory_map
+from vlnhijack.report.figures import before_after, curve, save_image
+from vlnhijack.report.trajectory_map import trajectory_map
 from vlnhijack.scenes.house_files import load_house
 from vlnhijack.threat import AttackInstance
 
