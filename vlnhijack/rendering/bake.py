@@ -1,8 +1,9 @@
-"""Path-traced light baked into textures, as scans carry it.
+"""Light baked into textures, as scans carry it.
 
-Diffuse light does not depend on the view: per texel, Mitsuba's path tracer looks at the surface
-from a millimetre in front of it. Light varies more slowly than albedo, so it is traced at a lower
-resolution, smoothed across coplanar neighbours and multiplied by the albedo.
+Diffuse light does not depend on the view, so it is gathered once per texel with Mitsuba's rays:
+shadow rays to every lamp, then rounds of cosine-distributed rays that pick up what the surfaces
+reflect so far, one bounce a round. Light varies more slowly than albedo, so it is gathered at half
+the resolution, smoothed across coplanar neighbours and multiplied by the albedo.
 """
 
 from dataclasses import dataclass, replace
@@ -11,46 +12,40 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from vlnhijack import display
-from vlnhijack.rendering.mitsuba_scene import MitsubaScene, build_scene
-from vlnhijack.rendering.observe import path_tracer, pixel_means
-from vlnhijack.rendering.samples import RAYS_AT_ONCE
-from vlnhijack.rendering.variant import activate
+from vlnhijack import display, seeds
+from vlnhijack.rendering.gather import Points, direct_light, reflected_light
+from vlnhijack.rendering.mitsuba_scene import build_scene, set_textures
 from vlnhijack.scenes.house import House, Light
 from vlnhijack.scenes.surface import Surface
 from vlnhijack.scenes.uv_atlas import Texels, dilate, rasterise
 
 BRIGHTNESS = 0.45
-_LIGHT_SHRINK = {256: 4, 48: 2}
-_IN_FRONT = 1.5e-3
-_SMALLEST_ALBEDO = 1e-3
+BOUNCES = 5
+LARGE = 48
 
 Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class _LightMap:
-    """Light (radiance over albedo) of K texels of an (h,w) grid, with their points and normals."""
+class _Grid:
+    """The K texels of an (h,w) grid that a surface uses, and the points they stand for."""
 
     shape: tuple[int, int]
     texels: Texels
-    points: Floats
-    normals: Floats
+    points: Points
 
 
 def bake(lit: House, spp: int = 64, seed: int = 0) -> House:
     """The baked house of a lit one: textures hold encode(clip(exposure · radiance)).
 
-    An exposure of 1 is replaced by the one that gives a mean texel of 0.45; the house that is
-    returned carries the exposure used. Lights become bright background surfaces.
+    spp rays per texel gather the last bounce. An exposure of 1 is replaced by the one that gives a
+    mean texel of 0.45; the house that is returned carries the exposure used. Lamps become bright
+    background surfaces. Surfaces need a texture of their own without overlapping uv.
     """
-    built = build_scene(lit)
-    maps = [_light_map(surface, _shrink(surface)) for surface in lit.surfaces]
-    points = np.concatenate([m.points for m in maps])
-    normals = np.concatenate([m.normals for m in maps])
-    light, lit_texels = _trace(built, points, normals, spp, seed)
-    ends = np.cumsum([len(m.points) for m in maps])[:-1]
-    parts = zip(lit.surfaces, maps, np.split(light, ends), np.split(lit_texels, ends), strict=True)
+    grids = [_grid(surface, _shrink(surface)) for surface in lit.surfaces]
+    light, is_open = _solve(lit, grids, spp, seed)
+    parts = zip(lit.surfaces, grids, light, is_open, strict=True)
     radiance = [_radiance(*part) for part in parts]
     exposure = lit.exposure if lit.exposure != 1 else _exposure([r[m] for r, m in radiance])
     surfaces = [
@@ -61,13 +56,50 @@ def bake(lit: House, spp: int = 64, seed: int = 0) -> House:
     return replace(lit, kind="baked", surfaces=tuple(surfaces), lights=(), exposure=exposure)
 
 
+def _solve(lit: House, grids: list[_Grid], spp: int, seed: int) -> tuple[list[Floats], list[Mask]]:
+    """Light (K,3) of each grid's texels, and which of them (K,) lie in the open, not in solids."""
+    albedo = [_albedo(*part) for part in zip(lit.surfaces, grids, strict=True)]
+    coarse = zip(lit.surfaces, grids, strict=True)
+    dark = tuple(replace(s, texture=np.zeros((*g.shape, 3), np.float32)) for s, g in coarse)
+    built = build_scene(replace(lit, kind="baked", surfaces=dark))
+    points = Points(
+        np.concatenate([grid.points.positions for grid in grids]),
+        np.concatenate([grid.points.normals for grid in grids]),
+    )
+    ends = np.cumsum([len(grid.points) for grid in grids])[:-1]
+    direct = direct_light(built, lit.lights, points, seeds.stream(seed, "bake", "direct"))
+    light, backs = direct, np.zeros(len(points), np.float32)
+    for bounce in range(BOUNCES):
+        glow = [_fill(*part) for part in zip(grids, np.split(light, ends), albedo, strict=True)]
+        set_textures(built, glow)
+        rays = spp if bounce == BOUNCES - 1 else max(spp // 4, 1)
+        random = seeds.stream(seed, "bake", "bounce", bounce)
+        reflected, backs = reflected_light(built, points, rays, random)
+        light = direct + reflected
+    return np.split(light, ends), np.split(backs < 0.5, ends)
+
+
+def _albedo(surface: Surface, grid: _Grid) -> Floats:
+    """Linear albedo (K,3) of the grid's texels: the mean of the texture's that they cover."""
+    shrink = _shrink(surface)
+    rows, columns = (-size % shrink for size in surface.texture.shape[:2])
+    padded = np.pad(display.decode(surface.texture), ((0, rows), (0, columns), (0, 0)), "edge")
+    means = padded.reshape(grid.shape[0], shrink, grid.shape[1], shrink, 3).mean((1, 3))
+    return np.asarray(means[grid.texels.rows, grid.texels.columns], np.float32)
+
+
+def _fill(grid: _Grid, light: Floats, albedo: Floats) -> Floats:
+    """The radiance texture (h,w,3) of a grid's light."""
+    texture = np.zeros((*grid.shape, 3), np.float32)
+    texture[grid.texels.rows, grid.texels.columns] = light * albedo
+    return texture
+
+
 def _shrink(surface: Surface) -> int:
-    """Texels per light texel: walls and floors take 4, furniture 2, the smallest textures 1."""
-    side = max(surface.texture.shape[:2])
-    return next((shrink for above, shrink in _LIGHT_SHRINK.items() if side > above), 1)
+    return 2 if max(surface.texture.shape[:2]) > LARGE else 1
 
 
-def _light_map(surface: Surface, shrink: int) -> _LightMap:
+def _grid(surface: Surface, shrink: int) -> _Grid:
     height, width = (-(-size // shrink) for size in surface.texture.shape[:2])
     texels = rasterise(surface.uv, surface.faces, height, width)
     corners = surface.vertices[surface.faces[texels.face]].astype(np.float64)
@@ -75,52 +107,16 @@ def _light_map(surface: Surface, shrink: int) -> _LightMap:
     points = np.einsum("kc,kcd->kd", inner, corners)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
-    return _LightMap((height, width), texels, points.astype(np.float32), normals.astype(np.float32))
-
-
-def _trace(
-    built: MitsubaScene, points: Floats, normals: Floats, spp: int, seed: int
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Light (K,3) at K points, and whether each (K,) lies in the open, not inside a solid."""
-    run = min(max(1, RAYS_AT_ONCE // spp), len(points))
-    light, is_open = np.zeros_like(points), np.zeros(len(points), bool)
-    for first in range(0, len(points), run):
-        index = np.minimum(np.arange(first, first + run), len(points) - 1)
-        light[index], is_open[index] = _trace_run(
-            built, points[index], normals[index], spp, (seed + first) % (1 << 32)
-        )
-    return light, is_open
-
-
-def _trace_run(
-    built: MitsubaScene, points: Floats, normals: Floats, spp: int, seed: int
-) -> tuple[Floats, NDArray[np.bool_]]:
-    mi = activate()
-    import drjit as dr
-
-    index = dr.arange(mi.UInt32, len(points) * spp) // dr.opaque(mi.UInt32, spp)
-    normal = dr.gather(mi.Vector3f, mi.Float(normals.ravel()), index)
-    origin = dr.gather(mi.Point3f, mi.Float(points.ravel()), index) + _IN_FRONT * normal
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, len(points) * spp)
-    ray = mi.RayDifferential3f(origin, -normal)
-    seen = built.scene.ray_intersect(ray, mi.RayFlags.All, True)
-    albedo = seen.bsdf().eval_diffuse_reflectance(seen)
-    radiance, _, _ = path_tracer().sample(built.scene, sampler, ray)
-    outwards = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(sampler.next_2d()))
-    around = built.scene.ray_intersect(mi.Ray3f(origin, outwards))
-    inside = around.is_valid() & (dr.dot(around.n, outwards) > 0)
-    light = radiance / dr.maximum(albedo, _SMALLEST_ALBEDO)
-    means = pixel_means((*light, dr.select(inside, mi.Float(1), 0)), spp)
-    return means[:, :3], means[:, 3] < 0.5
+    found = Points(points.astype(np.float32), normals.astype(np.float32))
+    return _Grid((height, width), texels, found)
 
 
 def _radiance(
-    surface: Surface, coarse: _LightMap, light: Floats, is_open: NDArray[np.bool_]
+    surface: Surface, coarse: _Grid, light: Floats, is_open: NDArray[np.bool_]
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Radiance (H,W,3) of a texture, and the mask (H,W) of its used texels."""
     shrink = _shrink(surface)
-    fine = coarse if shrink == 1 else _light_map(surface, 1)
+    fine = coarse if shrink == 1 else _grid(surface, 1)
     usable = is_open if is_open.any() else np.ones_like(is_open)
     smooth = _resample(coarse, light, usable, fine, shrink)
     rows, columns = fine.texels.rows, fine.texels.columns
@@ -132,10 +128,10 @@ def _radiance(
 
 
 def _resample(
-    coarse: _LightMap,
+    coarse: _Grid,
     light: Floats,
     usable: NDArray[np.bool_],
-    fine: _LightMap,
+    fine: _Grid,
     shrink: int,
 ) -> Floats:
     """Light (K,3) at the fine texels: a Gaussian over usable coarse texels of the same plane."""
@@ -146,7 +142,7 @@ def _resample(
     row = (fine.texels.rows + 0.5) / shrink - 0.5
     column = (fine.texels.columns + 0.5) / shrink - 0.5
     near_row, near_column = np.rint(row).astype(np.int64), np.rint(column).astype(np.int64)
-    total, weights = np.zeros_like(fine.points), np.zeros(len(row), np.float32)
+    total, weights = np.zeros_like(fine.points.positions), np.zeros(len(row), np.float32)
     for offset_row, offset_column in np.ndindex(5, 5):
         r = np.clip(near_row + offset_row - 2, 0, height - 1)
         c = np.clip(near_column + offset_column - 2, 0, width - 1)
@@ -163,9 +159,13 @@ def _resample(
     return total / weights[:, None]
 
 
-def _same_plane(fine: _LightMap, coarse: _LightMap, source: NDArray[np.int64]) -> NDArray[np.bool_]:
-    aligned = np.einsum("kd,kd->k", fine.normals, coarse.normals[source]) > 0.8
-    gap = np.einsum("kd,kd->k", fine.normals, coarse.points[source] - fine.points)
+def _same_plane(fine: _Grid, coarse: _Grid, source: NDArray[np.int64]) -> NDArray[np.bool_]:
+    aligned = np.einsum("kd,kd->k", fine.points.normals, coarse.points.normals[source]) > 0.8
+    gap = np.einsum(
+        "kd,kd->k",
+        fine.points.normals,
+        coarse.points.positions[source] - fine.points.positions,
+    )
     return aligned & (np.abs(gap) < 0.05)
 
 

@@ -74,7 +74,7 @@ def _object_index(house: House, built: MitsubaScene, ray: Any) -> NDArray[np.int
     import drjit as dr
 
     order = {item.id: index for index, item in enumerate(house.objects)}
-    table = [order.get(surface.object_id, -1) for surface in house.surfaces]
+    table = [order.get(surface.object_id or "", -1) for surface in house.surfaces]
     interaction = built.scene.ray_intersect(ray, mi.RayFlags.All, True)
     surface = built.surface_index(interaction)
     front = (mi.Frame3f.cos_theta(interaction.wi) > 0) & (surface >= 0)

@@ -80,7 +80,7 @@ def _trace(
     interaction = built.scene.ray_intersect(ray, mi.RayFlags.All, True)
     on_target = built.surface_index(interaction) == target
     radiance = interaction.emitter(built.scene).eval(interaction, ~on_target)
-    hit = dr.compress(on_target & (mi.Frame3f.cos_theta(interaction.wi) > 0))
+    hit: Any = dr.compress(on_target & (mi.Frame3f.cos_theta(interaction.wi) > 0))
     uv = [np.array(dr.gather(mi.Float, channel, hit)) for channel in interaction.uv]
     background = pixel_means(radiance, spp)
     rows = transport_rows(

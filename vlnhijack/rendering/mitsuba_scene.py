@@ -1,5 +1,6 @@
 """A Mitsuba scene in memory, built once from a house."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -28,7 +29,7 @@ class MitsubaScene:
         mi = activate()
         import drjit as dr
 
-        pointer = dr.reinterpret_array(mi.UInt32, interaction.shape)
+        pointer: Any = dr.reinterpret_array(mi.UInt32, interaction.shape)
         return dr.gather(mi.Int32, self.surface_of_shape, pointer)
 
 
@@ -56,9 +57,18 @@ def shared_scene(house: House) -> MitsubaScene:
 
 def texture_key(house: House, object_id: str) -> str:
     """The scene parameter that holds an object's texture."""
-    index = next(i for i, s in enumerate(house.surfaces) if s is house.surface(object_id))
+    index = next(i for i, s in enumerate(house.surfaces) if s.object_id == object_id)
     plugin = "emitter.radiance" if house.kind == "baked" else "bsdf.reflectance"
     return f"surface_{index}.{plugin}.data"
+
+
+def set_textures(built: MitsubaScene, textures: Sequence[NDArray[np.float32]]) -> None:
+    """Give every surface of a baked scene another texture (H,W,3), of the same shape."""
+    mi = activate()
+    params = mi.traverse(built.scene)
+    for index, texture in enumerate(textures):
+        params[f"surface_{index}.emitter.radiance.data"] = mi.TensorXf(texture)
+    params.update()
 
 
 def bitmap(texture: NDArray[np.float32]) -> dict[str, Any]:

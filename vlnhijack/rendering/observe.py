@@ -60,7 +60,7 @@ def pixel_means(channels: Iterable[Any], spp: int) -> NDArray[np.float32]:
     samples = list(channels)
     dr.eval(samples)
     sums = [np.array(dr.block_sum(channel, spp), np.float32) for channel in samples]
-    return np.stack(sums, -1) / np.float32(spp)
+    return np.asarray(np.stack(sums, -1) / np.float32(spp), np.float32)
 
 
 @cache

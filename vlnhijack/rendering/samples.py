@@ -109,10 +109,12 @@ def _ray_source() -> Any:
 
 @cache
 def _register() -> None:
-    mi = activate()
+    mi: Any = activate()
     import drjit as dr
 
-    class Views(mi.Sensor):  # type: ignore[misc]
+    sensor: Any = mi.Sensor
+
+    class Views(sensor):
         """Pinhole cameras of one size, stacked from top to bottom."""
 
         def __init__(self, props: Any) -> None:
