@@ -1,4 +1,4 @@
-"""The threat model: what an attacker may change, where, and what for (paper, sections 3 and 3.2)."""
+"""The threat model: what an attacker may change, where and what for (paper, sections 3, 3.2)."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class AttackInstance:
 
     @property
     def kind(self) -> str:
-        """"single_step" or "trajectory"."""
+        """ "single_step" or "trajectory"."""
         return "trajectory" if self.trajectory else "single_step"
 
     @property

@@ -129,7 +129,5 @@ def _tokens(index: Mapping[tuple[str, str], int], scan: str, found: list) -> lis
         for c in found
     ]
     tokens.append((VIEWS, STOP_TYPE, -1, 0.0, 0.0, True))
-    tokens += [
-        (view, 0, -1, *view_angles(view), True) for view in range(VIEWS) if view not in used
-    ]
+    tokens += [(view, 0, -1, *view_angles(view), True) for view in range(VIEWS) if view not in used]
     return tokens

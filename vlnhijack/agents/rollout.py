@@ -39,8 +39,12 @@ def rollout(
     paths = [list(guide) for guide in guides]
     active = list(range(len(paths)))
     for _ in range(max_steps):
-        walked = trajectories(table, [paths[e] for e in active], [start_headings[e] for e in active])
-        actions = _choose(policy, table, features, instructions.rows(torch.tensor(active)), walked, sampler)
+        walked = trajectories(
+            table, [paths[e] for e in active], [start_headings[e] for e in active]
+        )
+        actions = _choose(
+            policy, table, features, instructions.rows(torch.tensor(active)), walked, sampler
+        )
         here = walked.viewpoints[torch.arange(len(active)), walked.lengths - 1]
         targets = table.targets[here, actions].tolist()
         for episode, target in zip(active, targets, strict=True):

@@ -17,7 +17,6 @@ from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.views import nearest_view
 
-
 MAX_WORDS = 60
 
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 
 class ProjectedAdam:
-    """A texture (H,W,3) float32 under optimisation; only texels of `used` (H,W) bool ever change."""
+    """A texture (H,W,3) float32 under optimisation; only texels of `used` (H,W) ever change."""
 
     def __init__(
         self,

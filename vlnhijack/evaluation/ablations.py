@@ -96,9 +96,7 @@ def _pattern(group: Mapping[str, str]) -> re.Pattern[str]:
     return re.compile(rf"\b({'|'.join(map(re.escape, longest_first))})\b", re.IGNORECASE)
 
 
-def _other(
-    group: Mapping[str, str], rng: np.random.Generator
-) -> Callable[[re.Match[str]], str]:
+def _other(group: Mapping[str, str], rng: np.random.Generator) -> Callable[[re.Match[str]], str]:
     words = sorted(group)
 
     def other(match: re.Match[str]) -> str:

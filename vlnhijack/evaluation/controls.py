@@ -3,7 +3,7 @@
 import numpy as np
 
 from vlnhijack import seeds
-from vlnhijack.threat import Texture, project, quantise
+from vlnhijack.threat import Texture, quantise
 
 BLOCK = 16
 
@@ -25,4 +25,4 @@ def _signs(original: Texture, epsilon: float, block: int, seed: int) -> Texture:
     shape = (-(-height // block), -(-width // block), channels)
     signs = rng.choice(np.array([-1, 1], np.float32), size=shape)
     signs = signs.repeat(block, 0).repeat(block, 1)[:height, :width]
-    return quantise(project(original + np.float32(epsilon) * signs, original, epsilon), original, epsilon)
+    return quantise(original + np.float32(epsilon) * signs, original, epsilon)

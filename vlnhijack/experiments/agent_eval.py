@@ -1,5 +1,6 @@
 """Measure a clean agent on freshly rendered views."""
 
+from functools import partial
 from typing import Any
 
 import torch
@@ -7,10 +8,10 @@ from rich.progress import Progress
 
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import load_agent
+from vlnhijack.agents.observation import observation_table
 from vlnhijack.experiments.context import agent_file
 from vlnhijack.experiments.train_agent import AgentConfig, measure
 from vlnhijack.experiments.views import encode_house
-from vlnhijack.agents.observation import observation_table
 from vlnhijack.scenes.house_files import load_house
 from vlnhijack.settings import house_folder
 
@@ -28,17 +29,9 @@ def evaluate_agent(name: str, spp: int, seed: int, progress: Progress) -> dict[s
     }
     parts = []
     for house in houses.values():
-        task = progress.add_task(
-            f"views of {house.name}", total=36 * len(house.graph.viewpoints)
-        )
-        parts.append(
-            encode_house(
-                house,
-                agent.encoder,
-                spp,
-                seeds.integer(seed, "views", house.name),
-                lambda views, task=task: progress.advance(task, views),
-            )
-        )
+        task = progress.add_task(f"views of {house.name}", total=36 * len(house.graph.viewpoints))
+        advance = partial(progress.advance, task)
+        view_seed = seeds.integer(seed, "views", house.name)
+        parts.append(encode_house(house, agent.encoder, spp, view_seed, advance))
     table = observation_table([house.graph for house in houses.values()])
     return measure(config, agent, table, torch.cat(parts), houses)

@@ -27,6 +27,8 @@ from vlnhijack.evaluation.evaluate import evaluate_instance
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.views import house_cameras
+from vlnhijack.frames import Camera
+from vlnhijack.navigation.views import VIEWS
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.renderer import Renderer
@@ -94,8 +96,11 @@ def attack(context: Context, instance: AttackInstance) -> float:
 
 def object_views(
     context: Context, instance: AttackInstance, viewpoints: list[str] | None = None
-) -> tuple[Tensor, Tensor]:
-    """Table rows (V,) and views (V,) in which the object is seen, at the given viewpoints or all."""
+) -> tuple[Tensor, Tensor, list[Camera]]:
+    """Views in which the object is seen, at the given viewpoints or at all of them.
+
+    Their rows of the table (V,), view indices (V,) and cameras.
+    """
     scan = context.scans[instance.scan]
     column = [item.id for item in scan.house.objects].index(instance.object_id)
     seen = scan.coverage[:, :, column] > 0
@@ -104,7 +109,11 @@ def object_views(
         allowed[[scan.house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
         seen &= allowed[:, None]
     rows, views = np.nonzero(seen)
-    return torch.from_numpy(rows + context.rows(instance.scan).start), torch.from_numpy(views)
+    height, width = context.agent.encoder.image_size
+    cameras = house_cameras(scan.house.graph, width, height)
+    wanted = [cameras[VIEWS * row + view] for row, view in zip(rows, views, strict=True)]
+    start = context.rows(instance.scan).start
+    return torch.from_numpy(rows + start), torch.from_numpy(views), wanted
 
 
 def attacked_views(
@@ -112,16 +121,12 @@ def attacked_views(
 ) -> AttackedViews:
     """The object's views, rendered at the samples of the named stream."""
     house, settings = context.houses[instance.scan], context.config.rendering
-    rows, views = object_views(context, instance, viewpoints)
-    height, width = context.agent.encoder.image_size
-    cameras = house_cameras(house.graph, width, height)
-    start = context.rows(instance.scan).start
-    wanted = [cameras[36 * (row - start) + view] for row, view in zip(rows, views, strict=True)]
+    rows, views, cameras = object_views(context, instance, viewpoints)
     make = RENDERERS[settings.rung] if stream == "attack" else FrozenRenderer
     renderer: Renderer = make(
         house,
         instance.object_id,
-        wanted,
+        cameras,
         spp=settings.attack_spp,
         seed=context.seed("views", stream, instance.id),
     )

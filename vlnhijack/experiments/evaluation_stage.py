@@ -2,10 +2,10 @@
 
 import time
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import pandas as pd
 import torch
+from safetensors.torch import load_file
 from torch import Tensor
 
 from vlnhijack.artifacts import read_json, write_json
@@ -20,13 +20,12 @@ from vlnhijack.evaluation.records import load_records, save_records, to_frame
 from vlnhijack.experiments.attack_stage import AttackFiles, object_views
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
-from vlnhijack.experiments.views import encode_house, house_cameras
-from vlnhijack.frames import Camera
+from vlnhijack.experiments.views import encode_cameras
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
-from vlnhijack.threat import AttackInstance, quantise
+from vlnhijack.threat import AttackInstance, Texture, quantise
 
 _SEEDS = 8
 
@@ -65,7 +64,7 @@ def apply_check(context: Context, instance: AttackInstance, attacked: House) -> 
     excess = check_texels(
         attacked, instance.object_id, texture, original.surface(instance.object_id).texture, epsilon
     )
-    cameras = attack_cameras(context, instance)
+    _, _, cameras = object_views(context, instance, [instance.viewpoint])
     spp = context.config.rendering.attack_spp
 
     def optimiser(seed: int) -> Tensor:
@@ -92,18 +91,7 @@ def apply_check(context: Context, instance: AttackInstance, attacked: House) -> 
     }
 
 
-def attack_cameras(context: Context, instance: AttackInstance) -> list[Camera]:
-    """The agent's views at v_ATK in which the object is seen."""
-    height, width = context.agent.encoder.image_size
-    cameras = house_cameras(context.houses[instance.scan].graph, width, height)
-    start = context.rows(instance.scan).start
-    rows, views = object_views(context, instance, [instance.viewpoint])
-    return [cameras[36 * (row - start) + view] for row, view in zip(rows, views, strict=True)]
-
-
-def _exported(context: Context, instance: AttackInstance):
-    from safetensors.torch import load_file
-
+def _exported(context: Context, instance: AttackInstance) -> Texture:
     files = AttackFiles(context.folder / "attacks" / instance.id)
     kept = read_json(files.result)["best"]["iteration"]
     original = context.houses[instance.scan].surface(instance.object_id).texture
@@ -129,10 +117,17 @@ def _arms(
 
 
 def _features(context: Context, instance: AttackInstance, house: House) -> Tensor:
-    features = encode_house(
+    """Features of a house that differs from the clean one in the object's texture alone.
+
+    Views that do not see the object are the clean ones: the same house, the same samples.
+    """
+    rows, views, cameras = object_views(context, instance)
+    seen = encode_cameras(
         house,
         context.agent.encoder,
+        cameras,
         context.config.rendering.evaluation_spp,
-        context.seed("views", "evaluation", instance.scan),
+        context.seed("views", "object", instance.id),
     )
-    return context.place(features, instance.scan)
+    clean = context.place(clean_features(context, instance.scan), instance.scan)
+    return clean.index_put((rows, views), seen)

@@ -71,9 +71,7 @@ def pick(scan: Scan, picked: PickedInstance, rules: InstanceRules, seed: int) ->
     scan.house.graph.row(picked.viewpoint)
     if picked.target is not None:
         scan.house.graph.row(picked.target)
-    instance = build(
-        scan, picked.kind, picked.object, picked.viewpoint, rules, seed, picked.target
-    )
+    instance = build(scan, picked.kind, picked.object, picked.viewpoint, rules, seed, picked.target)
     coverage = scan.largest(picked.object, picked.viewpoint)
     if instance is None or not _fills(coverage, rules):
         raise InputError(

@@ -26,9 +26,7 @@ def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame
     position = house.graph.positions[house.graph.row(instance.viewpoint)].tolist()
     cameras = [panorama_cameras(tuple(position), WIDTH, HEIGHT)[view] for view in views]
     seed = context.seed("pictures", instance.id)
-    before, after = (
-        render_views(shown, cameras, SPP, seed).numpy() for shown in (house, attacked)
-    )
+    before, after = (render_views(shown, cameras, SPP, seed).numpy() for shown in (house, attacked))
     for name, images in (("before", before), ("after", after)):
         for view, image in zip(views, images, strict=True):
             save_image(folder / "views" / f"{name}_{view:02d}.png", image)
@@ -38,7 +36,8 @@ def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame
     curve(folder / "curve.png", read_rows(files.log), read_rows(files.validations))
     test = records[records["condition"] == "Test"]
     clean, hijacked = (
-        [list(path) for path in test.loc[test["arm"] == arm, "path"]] for arm in ("clean", "attacked")
+        [list(path) for path in test.loc[test["arm"] == arm, "path"]]
+        for arm in ("clean", "attacked")
     )
     trajectory_map(folder / "map.png", house, instance, clean, hijacked)
 

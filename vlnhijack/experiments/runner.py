@@ -31,7 +31,9 @@ from vlnhijack.threat import AttackInstance
 _PACKAGES = ("vlnhijack", "torch", "mitsuba", "drjit", "numpy", "xatlas", "trimesh")
 
 
-def run(config: ExperimentConfig, folder: Path, *, resume: bool, progress: Progress) -> dict[str, Any]:
+def run(
+    config: ExperimentConfig, folder: Path, *, resume: bool, progress: Progress
+) -> dict[str, Any]:
     """Run all stages that have no result in `folder` yet; the summary.
 
     Raises InputError where the folder holds a run that may not be continued, CheckError where the

@@ -21,7 +21,7 @@ from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.observation import ObservationTable, observation_table
 from vlnhijack.agents.training.encoder import EncoderSchedule, ViewTargets, train_encoder
-from vlnhijack.agents.training.imitation import ImitationSchedule, train_policy
+from vlnhijack.agents.training.imitation import ImitationSchedule, Lessons, train_policy
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.artifacts import read_json, write_bytes, write_json
@@ -31,12 +31,12 @@ from vlnhijack.experiments.yaml_config import Settings, save_config
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
-from vlnhijack.scenes.procedural.floor_plan import ROOM_LABELS
 from vlnhijack.scenes.procedural.furniture import CATEGORIES
-from vlnhijack.scenes.procedural.instructions import OBJECT_WORDS, ROOM_WORDS
+from vlnhijack.scenes.procedural.phrases import ROOM_WORDS, word_groups
 from vlnhijack.settings import house_folder
 
 _SAVE_EVERY = 200
+ROOM_LABELS = tuple(sorted(set(ROOM_WORDS.values())))
 
 
 class ViewSize(Settings):
@@ -81,7 +81,9 @@ def train_agent(config: AgentConfig, folder: Path, progress: Progress) -> Agent:
     train = _episodes(houses, config.train_houses, "train")
     vocabulary = Vocabulary.build(episode.instruction for episode in train)
     hamt = Hamt(HamtConfig.from_mapping({"vocab_size": len(vocabulary), **config.policy}))
-    agent = Agent(VitEncoder(vit).eval(), hamt, vocabulary, {}, folder / f"{config.name}.safetensors")
+    agent = Agent(
+        VitEncoder(vit).eval(), hamt, vocabulary, {}, folder / f"{config.name}.safetensors"
+    )
     if config.blind:
         features = blank_features(agent, features).contiguous()
     _policy(config, agent, table, features, train, folder, progress)
@@ -102,12 +104,11 @@ def measure(
     agent.policy.eval()
     seen = _episodes(houses, config.train_houses, "val_seen")
     unseen = _episodes(houses, config.unseen_houses, "val_unseen")
-    groups = [OBJECT_WORDS, ROOM_WORDS]
     return {
         "config": config.model_dump(mode="json"),
         "version": __version__,
         "views": config.views.model_dump(),
-        "val_seen": ablate(agent, table, features, seen, groups, config.seed),
+        "val_seen": ablate(agent, table, features, seen, word_groups(), config.seed),
         "val_seen_by_house": {
             name: rates(agent, table, features, [e for e in seen if e.scan == name])
             for name in config.train_houses
@@ -159,7 +160,9 @@ def _encoder(
         *(torch.cat([getattr(part, field.name) for part in data]) for field in fields(ViewTargets))
     )
     schedule = config.encoder
-    task = progress.add_task("encoder", total=schedule.epochs * (len(joined.images) // schedule.batch))
+    task = progress.add_task(
+        "encoder", total=schedule.epochs * (len(joined.images) // schedule.batch)
+    )
     losses = []
     for step, loss in train_encoder(
         vit, joined, len(CATEGORIES), len(ROOM_LABELS), schedule, config.seed
@@ -201,10 +204,7 @@ def _policy(
     smooth = None
     for step, loss in train_policy(
         policy,
-        table,
-        features,
-        agent.vocabulary,
-        episodes,
+        Lessons(table, features, agent.vocabulary, episodes),
         schedule,
         config.seed,
         optimiser,
@@ -231,7 +231,11 @@ def _restore(folder: Path, policy: Hamt, optimiser: torch.optim.Optimizer) -> in
         return 0
     tensors = load_file(folder / "policy.safetensors")
     policy.load_state_dict(
-        {name.removeprefix("policy."): t for name, t in tensors.items() if name.startswith("policy.")}
+        {
+            name.removeprefix("policy."): t
+            for name, t in tensors.items()
+            if name.startswith("policy.")
+        }
     )
     for name, parameter in policy.named_parameters():
         optimiser.state[parameter] = {

@@ -40,6 +40,19 @@ def encode_house(
     """Features (M,36,D) of all views of a house."""
     height, width = encoder.image_size
     cameras = house_cameras(house.graph, width, height)
+    features = encode_cameras(house, encoder, cameras, spp, seed, advance)
+    return features.view(-1, VIEWS, encoder.feature_size)
+
+
+def encode_cameras(
+    house: House,
+    encoder: ViewEncoder,
+    cameras: Sequence[Camera],
+    spp: int,
+    seed: int,
+    advance: Advance = lambda views: None,
+) -> Tensor:
+    """Features (V,D) of V cameras, rendered a few at a time."""
     features = []
     for start in range(0, len(cameras), _CHUNK):
         part = cameras[start : start + _CHUNK]
@@ -47,7 +60,7 @@ def encode_house(
         with torch.no_grad():
             features.append(encoder(images))
         advance(len(part))
-    return torch.cat(features).view(-1, VIEWS, encoder.feature_size)
+    return torch.cat(features)
 
 
 def coverage_table(house: House, width: int, height: int) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """Proxy tasks that teach a ViT what a view shows: categories, their extent, depth and room."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,7 +104,7 @@ def train_encoder(
     vit.eval()
 
 
-def warmup_cosine(steps: int, warmup: float = 0.05):
+def warmup_cosine(steps: int, warmup: float = 0.05) -> Callable[[int], float]:
     """Learning-rate factor of a step: a linear rise over 5 % of the steps, then a half cosine."""
     rise = max(1, int(steps * warmup))
 

@@ -17,7 +17,13 @@ from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.observation import ObservationTable
 from vlnhijack.agents.rollout import rollout, rows_of
 from vlnhijack.agents.training.encoder import warmup_cosine
-from vlnhijack.agents.trajectory import MAX_WORDS, Instructions, Trajectories, step_logits, trajectories
+from vlnhijack.agents.trajectory import (
+    MAX_WORDS,
+    Instructions,
+    Trajectories,
+    step_logits,
+    trajectories,
+)
 from vlnhijack.agents.vocabulary import UNK, Vocabulary
 from vlnhijack.errors import CheckError
 from vlnhijack.navigation.episode import Episode
@@ -30,7 +36,7 @@ class ImitationSchedule:
     steps of `batch` episodes; `forced` share of the steps with teacher forcing only, afterwards
     `sampled` share of each batch walks the agent's own samples; smoothing of the labels over the
     valid actions; peak learning rate and weight decay of AdamW; token_dropout is the chance that a
-    word is replaced by [UNK].
+    word is replaced by [UNK]; longest_sample bounds the moves of a sampled walk.
     """
 
     steps: int = 3000
@@ -41,6 +47,7 @@ class ImitationSchedule:
     lr: float = 5e-4
     weight_decay: float = 0.01
     token_dropout: float = 0.05
+    longest_sample: int = 9
 
 
 @dataclass
@@ -71,12 +78,19 @@ class NextHop:
         return {offset + row: offset + int(hop) for row, hop in enumerate(best)}
 
 
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """What a policy learns from: episodes in a world whose views have features (M,36,D)."""
+
+    table: ObservationTable
+    features: Tensor
+    vocabulary: Vocabulary
+    episodes: Sequence[Episode]
+
+
 def train_policy(
     policy: Hamt,
-    table: ObservationTable,
-    features: Tensor,
-    vocabulary: Vocabulary,
-    episodes: Sequence[Episode],
+    lessons: Lessons,
     schedule: ImitationSchedule,
     seed: int,
     optimiser: torch.optim.Optimizer,
@@ -85,17 +99,21 @@ def train_policy(
 ) -> Iterator[tuple[int, float]]:
     """Train `policy` in place from `first_step` on; yields (steps done, loss) after every step.
 
-    features (M,36,D) of all viewpoints of the table. Raises CheckError if the loss is not finite.
+    What a step draws depends on seed and step only, so a resumed training repeats it. Raises
+    CheckError if the loss is not finite.
     """
     rate = warmup_cosine(schedule.steps)
-    next_hop = NextHop(table)
+    next_hop = NextHop(lessons.table)
     for step in range(first_step, schedule.steps):
         rng = seeds.stream(seed, "imitation", step)
         torch.manual_seed(seeds.integer(seed, "imitation", "dropout", step))
-        batch = [episodes[row] for row in rng.integers(len(episodes), size=schedule.batch)]
+        picked = rng.integers(len(lessons.episodes), size=schedule.batch)
+        batch = [lessons.episodes[row] for row in picked]
+        forced = step < schedule.forced * schedule.steps
+        sampled = 0 if forced else int(schedule.batch * schedule.sampled)
         for group in optimiser.param_groups:
             group["lr"] = schedule.lr * rate(step)
-        loss = _step_loss(policy, table, features, vocabulary, batch, schedule, step, next_hop, rng)
+        loss = _loss(policy, lessons, batch, sampled, schedule, next_hop, rng)
         if not torch.isfinite(loss):
             raise CheckError(f"the policy's loss is not finite at step {step}")
         optimiser.zero_grad()
@@ -106,43 +124,43 @@ def train_policy(
     policy.eval()
 
 
-def _step_loss(
+def _loss(
     policy: Hamt,
-    table: ObservationTable,
-    features: Tensor,
-    vocabulary: Vocabulary,
+    lessons: Lessons,
     batch: Sequence[Episode],
+    sampled: int,
     schedule: ImitationSchedule,
-    step: int,
     next_hop: NextHop,
     rng: np.random.Generator,
 ) -> Tensor:
-    ids, mask = vocabulary.encode_batch([episode.instruction for episode in batch], MAX_WORDS)
+    """Loss of a batch whose first `sampled` episodes walk the agent's own samples."""
+    table = lessons.table
+    ids, mask = lessons.vocabulary.encode_batch([e.instruction for e in batch], MAX_WORDS)
     dropped = torch.from_numpy(rng.random(tuple(ids.shape)) < schedule.token_dropout)
     ids = torch.where(dropped & mask, UNK, ids)
     paths = [rows_of(table, episode) for episode in batch]
+    goals = [path[-1] for path in paths]
     headings = [episode.heading for episode in batch]
-    if step >= schedule.forced * schedule.steps:
-        sampled = int(len(batch) * schedule.sampled)
+    if sampled:
         policy.eval()
         with torch.no_grad():
             read = Instructions(policy.encode_text(ids[:sampled], mask[:sampled]), mask[:sampled])
         starts = [path[:1] for path in paths[:sampled]]
-        walked_paths = rollout(
-            policy, table, features, read, starts, headings[:sampled], max_steps=10, sampler=rng
+        paths[:sampled] = rollout(
+            policy,
+            table,
+            lessons.features,
+            read,
+            starts,
+            headings[:sampled],
+            max_steps=schedule.longest_sample,
+            sampler=rng,
         )
-    else:
-        walked_paths = []
     policy.train()
     read = Instructions(policy.encode_text(ids, mask), mask)
-    goals = [path[-1] for path in paths]
-    walked = trajectories(
-        table,
-        [*walked_paths, *paths[len(walked_paths) :]],
-        headings,
-    )
+    walked = trajectories(table, paths, headings)
     rows, steps, targets = _labels(table, walked, goals, next_hop)
-    logits = step_logits(policy, table, features, read, walked, rows, steps)
+    logits = step_logits(policy, table, lessons.features, read, walked, rows, steps)
     return smoothed_cross_entropy(logits, targets, schedule.smoothing)
 
 
