@@ -145,7 +145,7 @@ def _doorway(
     pair: tuple[int, int], shared: tuple[int, float, float, float, bool], rng: np.random.Generator
 ) -> Doorway:
     axis, wall, low, high, swapped = shared
-    width = float(rng.uniform(0.9, 1.2))
+    width = min(float(rng.uniform(0.9, 1.2)), high - low - 0.72)
     margin = 0.35 + width / 2
     centre = float(rng.uniform(low + margin, high - margin))
     rooms = (max(pair), min(pair)) if swapped else (min(pair), max(pair))

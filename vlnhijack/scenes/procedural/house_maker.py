@@ -17,6 +17,7 @@ from vlnhijack.scenes.procedural.layout import furnish
 from vlnhijack.scenes.procedural.lighting import EXPOSURE, make_lights
 from vlnhijack.scenes.procedural.painting import paint
 from vlnhijack.scenes.procedural.room_layout import Placement
+from vlnhijack.scenes.procedural.shapes import Mesh, join
 from vlnhijack.scenes.procedural.viewpoints import make_graph
 from vlnhijack.scenes.procedural.walls import Shell, room_shell
 from vlnhijack.scenes.surface import Surface
@@ -61,14 +62,16 @@ def _graph(
     shells: Sequence[Shell],
 ) -> NavigationGraph | None:
     obstacles = np.array([p.box[[0, 1, 3, 4]] for p in placements if p.blocks])
-    shapes = [trimesh.Trimesh(shell.vertices, shell.faces, process=False) for shell in shells]
-    pieces = [trimesh.Trimesh(p.vertices, p.piece.mesh.faces, process=False) for p in placements]
     landmarks = [
-        mesh
-        for mesh, placement in zip(pieces, placements, strict=True)
-        if placement.piece.category in ATTACKABLE
+        trimesh.Trimesh(p.vertices, p.piece.mesh.faces, process=False)
+        for p in placements
+        if p.piece.category in ATTACKABLE
     ]
-    mesh = trimesh.util.concatenate(shapes + pieces)
+    whole = join(
+        [Mesh(shell.vertices.astype(np.float64), shell.faces.astype(np.int64)) for shell in shells]
+        + [Mesh(p.vertices, p.piece.mesh.faces) for p in placements]
+    )
+    mesh = trimesh.Trimesh(whole.vertices, whole.faces, process=False)
     return make_graph(name, seed, plan, obstacles, landmarks, mesh)
 
 

@@ -24,7 +24,8 @@ def furnish(plan: FloorPlan, rng: np.random.Generator) -> list[Placement]:
 
 def _top_up(rooms: list[RoomLayout], rng: np.random.Generator) -> None:
     """Add attackable pieces, rare categories first, until there are enough."""
-    habitable = [room for room in rooms if room.room.label not in ("bathroom", "hallway")]
+    spare = ("bathroom", "hallway", "kitchen")
+    habitable = [room for room in rooms if room.room.label not in spare]
     for _ in range(60):
         counts = Counter(p.piece.category for room in rooms for p in room.placed)
         rare = [name for name in ATTACKABLE if counts[name] < FEWEST_OF_EACH]

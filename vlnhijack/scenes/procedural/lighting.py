@@ -9,7 +9,7 @@ from vlnhijack.scenes.procedural.floor_plan import FloorPlan, Window
 from vlnhijack.scenes.procedural.walls import pane
 
 EXPOSURE = 1.5
-BRIGHTNESS = 0.24
+BRIGHTNESS = 0.30
 SKY = np.array([0.55, 0.80, 1.10])
 LAMP = 0.45
 LAMP_SPACING = 3.6

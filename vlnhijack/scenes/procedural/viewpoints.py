@@ -36,7 +36,7 @@ def make_graph(
     mesh: trimesh.Trimesh,
 ) -> NavigationGraph | None:
     """A connected graph of 32-44 viewpoints that reaches every room, of eight drawn the one with
-    the most edges; None where there is none.
+    the most edges and landmarks; None where there is none.
 
     obstacles (B,4) are the boxes x0, y0, x1, y1 to stay clear of; each of `landmarks` gets a
     viewpoint, if there is a place, that sees it large; steps are checked against `mesh` by rays.
@@ -45,16 +45,19 @@ def make_graph(
     places = np.concatenate([doorways, standing_places(plan, obstacles)])
     eyes = np.column_stack([places, np.full(len(places), EYE_HEIGHT)])
     near = [lookouts(eyes, piece, stream(seed, "lookouts")) for piece in landmarks]
-    best: tuple[Array, nx.Graph] | None = None
+    best: tuple[int, Array, nx.Graph] | None = None
     for attempt in range(ATTEMPTS):
         rng = stream(seed, "viewpoints", attempt)
-        chosen = places[_grow(places, len(doorways), near, obstacles, mesh, rng)]
+        rows = _grow(places, len(doorways), near, obstacles, mesh, rng)
+        chosen = places[rows]
         if len(chosen) < FEWEST or not _reaches_every_room(chosen, plan):
             continue
         graph = _steps(chosen, obstacles, mesh)
-        if nx.is_connected(graph) and (best is None or graph.size() > best[1].size()):
-            best = chosen, graph
-    return None if best is None else _navigation_graph(name, seed, *best)
+        seen = sum(bool(np.isin(rows, landmark).any()) for landmark in near)
+        score = graph.size() + 2 * seen
+        if nx.is_connected(graph) and (best is None or score > best[0]):
+            best = score, chosen, graph
+    return None if best is None else _navigation_graph(name, seed, *best[1:])
 
 
 def _navigation_graph(name: str, seed: int, places: Array, graph: nx.Graph) -> NavigationGraph:
@@ -82,9 +85,10 @@ def standing_places(plan: FloorPlan, obstacles: Array, step: float = 0.1) -> Arr
 def walkable(plan: FloorPlan, points: Array) -> NDArray[np.bool_]:
     """Which points (P,2) are 0.25 m clear of the walls: in rooms or in the middle of doorways."""
     bounds = np.array([room.bounds for room in plan.rooms])
-    inside = (_overhang(points, bounds) <= -CLEARANCE).any(axis=1)
+    inside: NDArray[np.bool_] = (_overhang(points, bounds) <= -CLEARANCE).any(axis=1)
     passages = np.array([_passage(plan, row) for row in range(len(plan.doorways))])
-    return inside | (_overhang(points, passages) <= 0).any(axis=1)
+    inside |= (_overhang(points, passages) <= 0).any(axis=1)
+    return inside
 
 
 def distance_to_boxes(points: ArrayLike, boxes: Array) -> Array:
@@ -209,7 +213,7 @@ def _is_walkable(
     aside = np.stack([ahead[:, 1], -ahead[:, 0]], axis=-1)
     samples = start[:, None] + np.linspace(0, 1, 40)[:, None] * step[:, None]
     clear = distance_to_boxes(samples.reshape(-1, 2), obstacles).reshape(len(pairs), -1)
-    free = (clear >= 0.15).all(axis=1)
+    free: NDArray[np.bool_] = (clear >= 0.15).all(axis=1)
     for offset, z in product((-0.15, 0.0, 0.15), (0.2, 0.9, EYE_HEIGHT)):
         origins = np.column_stack([start + offset * aside, np.full(len(pairs), z)])
         directions = np.column_stack([ahead, np.zeros(len(pairs))])
