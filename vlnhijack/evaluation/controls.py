@@ -23,6 +23,6 @@ def _signs(original: Texture, epsilon: float, block: int, seed: int) -> Texture:
     height, width, channels = original.shape
     rng = seeds.stream(seed, "noise", block)
     shape = (-(-height // block), -(-width // block), channels)
-    signs = rng.choice(np.array([-1, 1], np.float32), size=shape)
+    signs = rng.choice((-1.0, 1.0), size=shape).astype(np.float32)
     signs = signs.repeat(block, 0).repeat(block, 1)[:height, :width]
     return quantise(original + np.float32(epsilon) * signs, original, epsilon)

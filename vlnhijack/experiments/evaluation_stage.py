@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import pandas as pd
 import torch
@@ -111,7 +112,7 @@ def _arms(
     arms = {"clean": lambda: context.place(clean_features(context, instance.scan), instance.scan)}
     for name, texture in noise.items():
         changed = house.with_texture(instance.object_id, texture)
-        arms[name] = lambda changed=changed: _features(context, instance, changed)
+        arms[name] = partial(_features, context, instance, changed)
     arms["attacked"] = lambda: _features(context, instance, attacked)
     return arms
 
