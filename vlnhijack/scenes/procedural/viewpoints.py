@@ -85,10 +85,9 @@ def standing_places(plan: FloorPlan, obstacles: Array, step: float = 0.1) -> Arr
 def walkable(plan: FloorPlan, points: Array) -> NDArray[np.bool_]:
     """Which points (P,2) are 0.25 m clear of the walls: in rooms or in the middle of doorways."""
     bounds = np.array([room.bounds for room in plan.rooms])
-    inside: NDArray[np.bool_] = (_overhang(points, bounds) <= -CLEARANCE).any(axis=1)
+    inside = (_overhang(points, bounds) <= -CLEARANCE).any(axis=1)
     passages = np.array([_passage(plan, row) for row in range(len(plan.doorways))])
-    inside |= (_overhang(points, passages) <= 0).any(axis=1)
-    return inside
+    return np.asarray(inside | (_overhang(points, passages) <= 0).any(axis=1))
 
 
 def distance_to_boxes(points: ArrayLike, boxes: Array) -> Array:
@@ -213,7 +212,7 @@ def _is_walkable(
     aside = np.stack([ahead[:, 1], -ahead[:, 0]], axis=-1)
     samples = start[:, None] + np.linspace(0, 1, 40)[:, None] * step[:, None]
     clear = distance_to_boxes(samples.reshape(-1, 2), obstacles).reshape(len(pairs), -1)
-    free: NDArray[np.bool_] = (clear >= 0.15).all(axis=1)
+    free = np.asarray((clear >= 0.15).all(axis=1))
     for offset, z in product((-0.15, 0.0, 0.15), (0.2, 0.9, EYE_HEIGHT)):
         origins = np.column_stack([start + offset * aside, np.full(len(pairs), z)])
         directions = np.column_stack([ahead, np.zeros(len(pairs))])
