@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.mitsuba_scene import MitsubaScene, shared_scene
-from vlnhijack.rendering.samples import camera_rays, centre_rays, runs, views_sensor
+from vlnhijack.rendering.samples import camera_rays, centre_rays, image_size, runs, views_sensor
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
 
@@ -21,11 +21,12 @@ def object_coverage(
     Of the same rays as `render_views(house, cameras, spp, seed)`.
     """
     count = len(house.objects)
+    width, height = image_size(cameras)
 
     def share(built: MitsubaScene, sensor: Any, run_seed: int) -> NDArray[Any]:
         ray, _ = camera_rays(sensor, run_seed, spp)
-        views = sensor.film().size()[1] // cameras[0].height
-        index = _object_index(house, built, ray).reshape(views, -1)
+        index = _object_index(house, built, ray).reshape(-1, width * height * spp)
+        views = len(index)
         bins = index + 1 + np.arange(views)[:, None] * (count + 1)
         hits = np.bincount(bins.ravel(), minlength=views * (count + 1))
         return hits.reshape(views, count + 1)[:, 1:] / index.shape[1]
@@ -39,7 +40,7 @@ def object_index_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.int1
     def index(built: MitsubaScene, sensor: Any, _: int) -> NDArray[Any]:
         return _object_index(house, built, centre_rays(sensor)).astype(np.int16)
 
-    width, height = cameras[0].width, cameras[0].height
+    width, height = image_size(cameras)
     return _for_views(house, cameras, 1, 0, index).reshape(-1, height, width)
 
 
@@ -49,7 +50,7 @@ def depth_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.float32]:
     def distance(built: MitsubaScene, sensor: Any, _: int) -> NDArray[Any]:
         return np.array(built.scene.ray_intersect_preliminary(centre_rays(sensor)).t)
 
-    width, height = cameras[0].width, cameras[0].height
+    width, height = image_size(cameras)
     return _for_views(house, cameras, 1, 0, distance).reshape(-1, height, width)
 
 

@@ -14,7 +14,7 @@ from vlnhijack.frames import Camera
 from vlnhijack.rendering.mitsuba_scene import MitsubaScene, shared_scene
 from vlnhijack.rendering.observe import pixel_means
 from vlnhijack.rendering.renderer import require_texture
-from vlnhijack.rendering.samples import camera_rays, runs, views_sensor
+from vlnhijack.rendering.samples import camera_rays, image_size, runs, views_sensor
 from vlnhijack.rendering.transport import assemble, transport_rows
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
@@ -40,18 +40,19 @@ class FrozenRenderer:
                 file=house.name, field="kind", expected="baked, for FrozenRenderer", received="lit"
             )
         self.cameras = tuple(cameras)
-        height, width, _ = house.surface(object_id).texture.shape
-        self.texture_shape = (height, width, 3)
+        rows, columns, _ = house.surface(object_id).texture.shape
+        self.texture_shape = (rows, columns, 3)
         target = next(i for i, s in enumerate(house.surfaces) if s.object_id == object_id)
         built, sensor = shared_scene(house), None
         parts, backgrounds = [], []
         for run in runs(cameras, spp, seed):
             sensor = sensor or views_sensor(run.cameras, spp)
             sensor.aim(run.cameras)
-            rows, background = _trace(built, target, sensor, run.seed, spp, self.texture_shape)
-            parts.append(rows)
+            part, background = _trace(built, target, sensor, run.seed, spp, self.texture_shape)
+            parts.append(part)
             backgrounds.append(background)
-        pixels = len(cameras) * cameras[0].width * cameras[0].height
+        width, height = image_size(cameras)
+        pixels = len(cameras) * height * width
         parts[-1] = parts[-1][: pixels - sum(part.shape[0] for part in parts[:-1])]
         self.transport = assemble(parts, self.texture_shape)
         self.background = torch.from_numpy(np.concatenate(backgrounds)[:pixels])
@@ -60,7 +61,7 @@ class FrozenRenderer:
         """Images (V,3,h,w) of a texture (H,W,3); InputError for another shape."""
         require_texture(texture, self.texture_shape)
         image = self.background + self.transport(texture)
-        height, width = self.cameras[0].height, self.cameras[0].width
+        width, height = image_size(self.cameras)
         return image.view(-1, height, width, 3).permute(0, 3, 1, 2)
 
 

@@ -10,7 +10,7 @@ from vlnhijack.frames import Camera
 from vlnhijack.rendering.mitsuba_scene import build_scene, texture_key
 from vlnhijack.rendering.observe import LIT_DEPTH
 from vlnhijack.rendering.renderer import require_texture
-from vlnhijack.rendering.samples import runs, views_sensor
+from vlnhijack.rendering.samples import image_size, runs, views_sensor
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
 
@@ -37,8 +37,8 @@ class MitsubaRenderer:
         self.cameras = tuple(cameras)
         self.spp, self.seed = spp, seed
         self.gradient_seed: int | None = None
-        height, width, _ = house.surface(object_id).texture.shape
-        self.texture_shape = (height, width, 3)
+        rows, columns, _ = house.surface(object_id).texture.shape
+        self.texture_shape = (rows, columns, 3)
         self._exposure = house.exposure if house.kind == "lit" else None
         depth = max_depth or (1 if house.kind == "baked" else LIT_DEPTH)
         self._integrator = mi.load_dict({"type": "prb", "max_depth": depth})
@@ -59,7 +59,7 @@ class MitsubaRenderer:
                 self._sensors, runs(self.cameras, self.spp, self.seed), strict=True
             )
         ]
-        height, width = self.cameras[0].height, self.cameras[0].width
+        width, height = image_size(self.cameras)
         images = torch.cat(films).view(-1, height, width, 3)[: len(self.cameras)]
         shown = images if self._exposure is None else _encode(self._exposure * images)
         return shown.permute(0, 3, 1, 2)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vlnhijack import display
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.mitsuba_scene import MitsubaScene, shared_scene
-from vlnhijack.rendering.samples import camera_rays, runs, views_sensor
+from vlnhijack.rendering.samples import camera_rays, image_size, runs, views_sensor
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House
 
@@ -26,7 +26,7 @@ def render_views(
     Baked houses take primary rays alone, lit ones path tracing; `spp` is a square number. Raises
     InputError where the cameras differ in size.
     """
-    width, height = cameras[0].width, cameras[0].height
+    width, height = image_size(cameras)
     images = np.empty((len(cameras), 3, height, width), np.float32)
     built, sensor = shared_scene(house), None
     for run in runs(cameras, spp, seed):

@@ -21,13 +21,14 @@ RAYS_AT_ONCE = 1 << 22
 _FAR = 1e4
 
 
-def check_cameras(cameras: Sequence[Camera]) -> None:
-    """Raises InputError unless there is at least one camera and all have one image size."""
+def image_size(cameras: Sequence[Camera]) -> tuple[int, int]:
+    """Width and height of all cameras; InputError where there is none or they differ."""
     sizes = {(camera.width, camera.height) for camera in cameras}
     if len(sizes) != 1:
         raise InputError(
             field="cameras", expected="one or more of one image size", received=sorted(sizes)
         )
+    return sizes.pop()
 
 
 def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
@@ -35,13 +36,13 @@ def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
 
     `sensor.aim(cameras)` points it at as many other cameras of the same size.
     """
-    check_cameras(cameras)
+    width, height = image_size(cameras)
     mi = activate()
     _register()
     film = {
         "type": "hdrfilm",
-        "width": cameras[0].width,
-        "height": cameras[0].height * len(cameras),
+        "width": width,
+        "height": height * len(cameras),
         "rfilter": {"type": "box"},
         "pixel_format": "rgb",
         "component_format": "float32",
@@ -56,12 +57,13 @@ def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
 def camera_rays(sensor: Any, seed: int, spp: int) -> tuple[Any, Any]:
     """Rays in film order, `spp` after another for each pixel, and the sampler that drew them.
 
-    They are those of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator).
+    They are those of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator). Raises
+    InputError where spp is no square number, as the stratified sampler needs.
     """
     integrator = _ray_source()
     sampler, drawn = integrator.prepare(sensor, seed, spp)
     if drawn != spp:
-        raise InputError(field="spp", expected=f"{drawn} or another count", received=spp)
+        raise InputError(field="spp", expected="a square number", received=spp)
     ray, _, _ = integrator.sample_rays(sensor=sensor, scene=None, sampler=sampler)
     return ray, sampler
 
@@ -93,9 +95,8 @@ def runs(cameras: Sequence[Camera], spp: int, seed: int = 0) -> Iterator[Run]:
     The last run is filled up with its last camera, so that one compiled kernel serves all. Whoever
     renders the same cameras, spp and seed by these runs uses the same rays.
     """
-    check_cameras(cameras)
-    rays = cameras[0].width * cameras[0].height * spp
-    length = min(max(1, RAYS_AT_ONCE // rays), len(cameras))
+    width, height = image_size(cameras)
+    length = min(max(1, RAYS_AT_ONCE // (width * height * spp)), len(cameras))
     for first in range(0, len(cameras), length):
         run = list(cameras[first : first + length])
         run += [run[-1]] * (length - len(run))
