@@ -49,7 +49,7 @@ def _jpeg(surface: Surface) -> Image.Image:
     """An image that trimesh writes as JPEG of quality 90 with full colour resolution."""
     image = Image.fromarray(display.to_8bit(surface.texture))
     image.format = "JPEG"
-    image.save = partial(image.save, quality=90, subsampling=0, optimize=True)  # type: ignore[method-assign]
+    image.save = partial(image.save, quality=90, subsampling=0)  # type: ignore[method-assign]
     return image
 
 
