@@ -1,0 +1,102 @@
+"""Small worlds for tests: a grid of viewpoints, a tiny agent with random weights, features."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vlnhijack import seeds
+from vlnhijack.agents.checkpoints import Agent
+from vlnhijack.agents.encoder import VitEncoder
+from vlnhijack.agents.hamt import Hamt
+from vlnhijack.agents.hamt_config import HamtConfig
+from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.agents.vit import VisionTransformer, VitConfig
+from vlnhijack.agents.vocabulary import Vocabulary
+from vlnhijack.navigation.episode import Episode
+from vlnhijack.navigation.graph import NavigationGraph
+
+COLUMNS, ROWS = 4, 3
+VIT = VitConfig((8, 12), patch=4, dim=8, depth=1, heads=2)
+WORDS = ("walk", "turn", "left", "right", "past", "the", "chair", "sofa", "lamp", "kitchen", "stop")
+
+
+class World(NamedTuple):
+    """An agent, the table of two scans ("east", "west"), features (24,36,8), episodes of both."""
+
+    agent: Agent
+    table: ObservationTable
+    features: Tensor
+    episodes: list[Episode]
+
+
+def world(*, no_lang_ca: bool = False, seed: int = 0) -> World:
+    """The same world for the same arguments; `no_lang_ca` is HAMT's RxR variant."""
+    graphs = [grid_graph("east"), grid_graph("west")]
+    agent = tiny_agent(no_lang_ca=no_lang_ca, seed=seed)
+    table = observation_table(graphs)
+    random = seeds.stream(seed, "features")
+    features = torch.from_numpy(random.normal(size=(len(table.index), 36, VIT.dim))).float()
+    return World(agent, table, features, [e for graph in graphs for e in walks(graph)])
+
+
+def grid_graph(scan: str) -> NavigationGraph:
+    """4 × 3 viewpoints about 2 m apart, uneven: shortest paths are unique, one stands high."""
+    random = seeds.stream(0, "grid", scan)
+    column, row = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
+    flat = np.stack([column.ravel(), row.ravel(), np.full(COLUMNS * ROWS, 0.75)], 1) * 2.0
+    positions = flat + random.uniform(-0.25, 0.25, flat.shape)
+    positions[5, 2] += 1.5
+    adjacency = np.abs(flat[:, None] - flat[None]).sum(-1) == 2
+    adjacency[[0, 2], [2, 0]] = True  # seen in the same view as its neighbour 1
+    names = tuple(f"{scan}{number:02d}" for number in range(len(flat)))
+    return NavigationGraph(scan, names, positions, adjacency, np.full(len(flat), 1.5))
+
+
+def walks(graph: NavigationGraph, shortest: int = 4) -> list[Episode]:
+    """All shortest paths of at least that many viewpoints, three instructions each."""
+    random = seeds.stream(0, "walks", graph.scan)
+    episodes: list[Episode] = []
+    for start in graph.viewpoints:
+        for goal in graph.viewpoints:
+            path = tuple(graph.shortest_path(start, goal))
+            if len(path) < shortest:
+                continue
+            number = len(episodes) // 3
+            heading = float(random.uniform(0, 2 * np.pi))
+            length = sum(graph.distance(*step) for step in pairwise(path))
+            for k in range(3):
+                words = " ".join(random.choice(WORDS, size=random.integers(3, 9)))
+                episodes.append(
+                    Episode(number, graph.scan, path, heading, words, f"{number}_{k}", length)
+                )
+    return episodes
+
+
+def tiny_agent(*, no_lang_ca: bool = False, seed: int = 0, scale: float = 0.3) -> Agent:
+    """A frozen agent with weights N(0, scale), large enough for decisions that differ."""
+    vocabulary = Vocabulary.build(WORDS)
+    config = HamtConfig(
+        hidden_size=16,
+        num_attention_heads=2,
+        intermediate_size=32,
+        max_position_embeddings=64,
+        vocab_size=len(vocabulary),
+        max_action_steps=30,
+        num_l_layers=1,
+        num_x_layers=2,
+        num_h_pano_layers=1,
+        no_lang_ca=no_lang_ca,
+        image_feat_size=VIT.dim,
+    )
+    encoder, policy = VitEncoder(VisionTransformer(VIT)), Hamt(config)
+    generator = torch.Generator().manual_seed(seed)
+    for parameter in [*encoder.parameters(), *policy.parameters()]:
+        if parameter.dim() > 1:
+            torch.nn.init.normal_(parameter, std=scale, generator=generator)
+    for model in (encoder, policy):
+        model.eval().requires_grad_(False)
+    return Agent(encoder, policy, vocabulary, {}, Path("tiny.safetensors"))
