@@ -9,6 +9,8 @@ from vlnhijack.navigation.episode import Episode
 
 Texture = NDArray[np.float32]
 
+_FLOAT32_LEVELS = 1e-4  # more than a float32 value can be off its 8-bit level, in levels
+
 
 @dataclass(frozen=True)
 class AttackInstance:
@@ -65,8 +67,8 @@ def quantise(texture: Texture, original: Texture, epsilon: float) -> Texture:
     original and epsilon as in `project`; values are multiples of 1/255.
     """
     exact = original.astype(np.float64)
-    lower = np.ceil(np.maximum(exact - epsilon, 0) * 255 - 1e-6)
-    upper = np.floor(np.minimum(exact + epsilon, 1) * 255 + 1e-6)
+    lower = np.ceil(np.maximum(exact - epsilon, 0) * 255 - _FLOAT32_LEVELS)
+    upper = np.floor(np.minimum(exact + epsilon, 1) * 255 + _FLOAT32_LEVELS)
     levels = np.clip(np.rint(texture.astype(np.float64) * 255), lower, upper)
     return (levels / 255).astype(np.float32)
 
