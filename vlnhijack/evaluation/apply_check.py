@@ -21,6 +21,10 @@ def check_texels(
 ) -> float:
     """The reloaded texture is the exported one, inside the ε-ball; the budget's violation (≤ 0)."""
     loaded = house.surface(object_id).texture
+    if loaded.shape != exported.shape:
+        raise CheckError(
+            f"apply check: {object_id} on disk is {loaded.shape}, exported was {exported.shape}"
+        )
     if not np.array_equal(loaded, exported):
         changed = int((loaded != exported).any(-1).sum())
         raise CheckError(f"apply check: {changed} texels of {object_id} on disk differ from export")

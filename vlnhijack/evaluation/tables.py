@@ -71,7 +71,7 @@ def _by_arm(records: pd.DataFrame, rates: dict[str, str]) -> Summary:
 
 def interval(records: pd.DataFrame, column: str) -> tuple[float, float]:
     """95 % percentile bootstrap of the mean over clusters: objects, or paths of a single object."""
-    cluster = "object" if records["object"].nunique() > 1 else "path_id"
+    cluster = "object" if records.groupby(["scan", "object"]).ngroups > 1 else "path_id"
     groups = records.groupby(["scan", cluster])[column].agg(["sum", "count"]).to_numpy(float)
     rng = seeds.stream(0, "bootstrap", column)
     drawn = groups[rng.integers(len(groups), size=(_DRAWS, len(groups)))].sum(1)
