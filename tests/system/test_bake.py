@@ -8,7 +8,11 @@ import pytest
 from tests.houses import tiny_house
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.bake import bake
+from vlnhijack.rendering.gather import Points, direct_light, reflected_light
+from vlnhijack.rendering.mitsuba_scene import build_scene
 from vlnhijack.rendering.observe import render_views
+from vlnhijack.scenes.house import House, Light
+from vlnhijack.scenes.surface import Surface
 from vlnhijack.scenes.uv_atlas import used_texels
 
 
@@ -49,3 +53,41 @@ def test_baking_repeats_with_a_seed() -> None:
     for a, b in zip(first.surfaces, again.surfaces, strict=True):
         np.testing.assert_array_equal(a.texture, b.texture)
     assert not np.array_equal(first.surfaces[0].texture, other.surfaces[0].texture)
+
+
+def _ceiling(height: float) -> House:
+    """Nothing but a plate of 2 × 2 m that glows downwards with radiance 1."""
+    corners = np.float32([[-1, 1, height], [1, 1, height], [1, -1, height], [-1, -1, height]])
+    faces, uv = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros((4, 2), np.float32)
+    plate = Surface("ceiling", corners, faces, uv, np.ones((2, 2, 3), np.float32))
+    return replace(tiny_house(), surfaces=(plate,), objects=())
+
+
+def _form_factor(height: float) -> float:
+    """Of a square of half-width 1 seen from a parallel element below its centre (Howell C-11)."""
+    side = 1 / height
+    root = np.sqrt(1 + side**2)
+    return float(4 / np.pi * side / root * np.arctan(side / root))
+
+
+def test_gathered_light_is_the_form_factor() -> None:
+    """Both ways, as a lamp and as a glowing surface; a point that looks away gets none."""
+    normals = np.float32([[0, 0, 1], [0, 0, -1]])
+    points = Points(np.zeros((2, 3), np.float32), normals)
+    lamp = Light((0.0, 0.0, 1.5), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (1.0, 1.0, 1.0))
+    ceiling, random = build_scene(_ceiling(1.5)), np.random.default_rng(0)
+    empty = build_scene(_ceiling(-9.0))
+    direct = np.mean([direct_light(empty, [lamp], points, random) for _ in range(200)], 0)
+    reflected, backs = reflected_light(ceiling, points, 20_000, random)
+    for light in (direct, reflected):
+        np.testing.assert_allclose(light[0], _form_factor(1.5), rtol=0.01)
+        np.testing.assert_array_equal(light[1], 0)
+    assert backs.max() == 0
+
+
+def test_backs_of_surfaces_are_counted() -> None:
+    """Below the ceiling its front is seen; from above, its back."""
+    points = Points(np.float32([[0, 0, 2], [0, 0, 1]]), np.float32([[0, 0, -1], [0, 0, 1]]))
+    _, backs = reflected_light(build_scene(_ceiling(1.5)), points, 1000, np.random.default_rng(0))
+    assert backs[0] > 0.7
+    assert backs[1] == 0

@@ -90,6 +90,15 @@ def test_coverage_is_the_row_sum_of_the_frozen_operator() -> None:
     assert coverage[:, 0].min() > 0.1
 
 
+def test_the_inside_of_an_object_is_no_part_of_it() -> None:
+    """Area emitters are one-sided: a camera in the cabinet sees black, not its texture."""
+    house, inside = tiny_house(), [Camera((0.0, 0.0, 0.45), 0.3, 0.0, 16, 12)]
+    assert object_coverage(house, inside).max() == 0
+    assert object_index_map(house, inside).max() == -1
+    assert FrozenRenderer(house, "cabinet_0", inside).transport.texels.numel() == 0
+    assert render_views(house, inside).max() == 0
+
+
 def test_index_maps_agree_with_coverage() -> None:
     house, cameras = tiny_house(), _towards((1.9, 1.9, 0.3))
     index = object_index_map(house, cameras)
