@@ -5,6 +5,7 @@ Follows VLN-HAMT's `r2r/agent_cmt.py` (`_cand_pano_feature_variable`, `_history_
 """
 
 from functools import cache
+from itertools import pairwise, zip_longest
 
 import numpy as np
 import torch
@@ -51,20 +52,24 @@ class Step:
         return len(self.exits) if target is None else self.exits.index(target)
 
 
-def logits_along(world: World, episode: Episode, path: list[str]) -> list[tuple[Step, Tensor]]:
-    """The steps of a walk along `path` and the logits (N,) that the policy gives at each."""
-    policy, vocabulary = world.agent.policy, world.agent.vocabulary
-    ids = torch.tensor([vocabulary.encode(episode.instruction, 60)])
-    text_mask = torch.ones_like(ids, dtype=torch.bool)
-    text = policy.encode_text(ids, text_mask)
-    history = [policy.history_cls(1)]
-    base, result = nearest_view(episode.heading), []
-    for number, viewpoint in enumerate(path):
-        step = Step(world, episode.scan, viewpoint, base)
-        past = torch.stack(history, 1)
-        logits = policy.outputs(
-            text,
-            text_mask,
+class Walk:
+    """An agent on its way; `look` gives what it sees and its logits (N,), `move` goes on."""
+
+    def __init__(self, world: World, episode: Episode) -> None:
+        self.world, self.episode = world, episode
+        self.policy = world.agent.policy
+        self.ids = torch.tensor([world.agent.vocabulary.encode(episode.instruction, 60)])
+        self.read = torch.ones_like(self.ids, dtype=torch.bool)
+        self.text = self.policy.encode_text(self.ids, self.read)
+        self.history = [self.policy.history_cls(1)]
+        self.base = nearest_view(episode.heading)
+
+    def look(self, viewpoint: str) -> tuple[Step, Tensor]:
+        step = Step(self.world, self.episode.scan, viewpoint, self.base)
+        past = torch.stack(self.history, 1)
+        logits = self.policy.outputs(
+            self.text,
+            self.read,
             past,
             torch.ones(past.shape[:2], dtype=torch.bool),
             step.images[None],
@@ -72,29 +77,40 @@ def logits_along(world: World, episode: Episode, path: list[str]) -> list[tuple[
             step.types[None],
             torch.ones(1, len(step.types), dtype=torch.bool),
         ).logits[0]
+        return step, logits
+
+    def move(self, step: Step, action: int) -> str:
+        number = torch.tensor([len(self.history) - 1])
+        image, angle = step.views[None, self.base], step.angles[None, action]
+        token = self.policy.encode_history(
+            image, angle, step.views[None], step.around[None], number
+        )
+        self.history.append(token)
+        self.base = step.exit_views[action]
+        return step.exits[action]
+
+
+def logits_along(world: World, episode: Episode, path: list[str]) -> list[tuple[Step, Tensor]]:
+    """The steps of a walk along `path` and the logits (N,) that the policy gives at each."""
+    walk, result = Walk(world, episode), []
+    for here, there in zip_longest(path, path[1:]):
+        step, logits = walk.look(here)
         result.append((step, logits))
-        if number + 1 < len(path):
-            action = step.action(path[number + 1])
-            history.append(
-                policy.encode_history(
-                    step.views[None, base],
-                    step.angles[None, action],
-                    step.views[None],
-                    step.around[None],
-                    torch.tensor([number]),
-                )
-            )
-            base = step.exit_views[action]
+        if there is not None:
+            walk.move(step, step.action(there))
     return result
 
 
 def act(world: World, episode: Episode, guide: list[str], max_steps: int = 15) -> list[str]:
     """The path of the argmax agent after the guide, guide included."""
-    path = list(guide)
+    walk, path = Walk(world, episode), list(guide)
+    for here, there in pairwise(guide):
+        step, _ = walk.look(here)
+        walk.move(step, step.action(there))
     for _ in range(max_steps):
-        step, logits = logits_along(world, episode, path)[-1]
+        step, logits = walk.look(path[-1])
         action = int(logits.argmax())
         if action == len(step.exits):
             break
-        path.append(step.exits[action])
+        path.append(walk.move(step, action))
     return path

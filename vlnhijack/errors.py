@@ -29,7 +29,8 @@ class InputError(VlnHijackError):
         what = message
         if expected is not None:
             what += f"{'; ' if what else ''}expected {expected}, received {_short(received)}"
-        super().__init__(f"{where}: {what}" if where and what else where or what)
+        text = f"{where}: {what}" if where and what else where or what
+        super().__init__(" ".join(text.split()))
 
 
 class SetupError(VlnHijackError):

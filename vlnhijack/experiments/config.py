@@ -44,11 +44,11 @@ class InstanceRules(Settings):
     min_coverage: Share = 0.4
     max_coverage: Share = 1.0
     min_train: PositiveInt = 5
-    min_paths: PositiveInt = 2
+    min_paths: Annotated[int, Field(ge=2)] = 2
     min_test: PositiveInt = 3
     target_distance: PositiveFloat = 3.0
     max_steps: PositiveInt = 5
-    validation: Share = 0.2
+    validation: Annotated[float, Field(gt=0, lt=1)] = 0.2
 
 
 class RenderSettings(Settings):

@@ -13,6 +13,8 @@ from vlnhijack.navigation.episode import Episode
 from vlnhijack.scenes.house import House
 from vlnhijack.threat import AttackInstance
 
+_FLOAT32 = 1e-6  # more than the rounding of a share of a view
+
 
 @dataclass(frozen=True, eq=False)
 class Scan:
@@ -45,6 +47,8 @@ def draw(
     used: set[tuple[str, str]] = set()
     later = []
     for row in order:
+        if len(instances) == count:
+            break
         scan, object_id, viewpoint = places[row]
         if (scan.house.name, object_id) in used:
             later.append(places[row])
@@ -67,18 +71,18 @@ def draw(
 
 def pick(scan: Scan, picked: PickedInstance, rules: InstanceRules, seed: int) -> AttackInstance:
     """The instance named in an experiment file; InputError where it breaks a rule."""
-    scan.house.object(picked.object)
+    category = scan.house.object(picked.object).category
     scan.house.graph.row(picked.viewpoint)
     if picked.target is not None:
         scan.house.graph.row(picked.target)
     instance = build(scan, picked.kind, picked.object, picked.viewpoint, rules, seed, picked.target)
     coverage = scan.largest(picked.object, picked.viewpoint)
-    if instance is None or not _fills(coverage, rules):
+    if instance is None or (picked.object, picked.viewpoint) not in _places(scan, rules):
         raise InputError(
             file=scan.house.name,
             field=f"instance {picked.object} at {picked.viewpoint}",
-            expected=f"coverage and episodes within the rules ({rules})",
-            received=f"coverage {coverage:.2f} or too few episodes",
+            expected=f"category, coverage and episodes within the rules ({rules})",
+            received=f"a {category}, coverage {coverage:.2f}, or too few episodes",
         )
     return instance
 
@@ -100,7 +104,8 @@ def build(
     test = [e for e in _through(scan.val_seen, viewpoint) if _usable(e, viewpoint, kind)]
     trajectory: tuple[str, ...] = ()
     if kind == "trajectory":
-        chosen = target or _draw_target(scan, viewpoint, test, rules, seeds.integer(seed, name))
+        among = scan.house.graph.viewpoints if target is None else (target,)
+        chosen = _draw_target(scan, viewpoint, among, test, rules, seeds.integer(seed, name))
         if chosen is None:
             return None
         trajectory = tuple(scan.house.graph.shortest_path(viewpoint, chosen)[1:])
@@ -140,7 +145,7 @@ def _places(scan: Scan, rules: InstanceRules) -> list[tuple[str, str]]:
 
 
 def _fills(coverage: float, rules: InstanceRules) -> bool:
-    return rules.min_coverage - 1e-9 <= coverage <= rules.max_coverage + 1e-9
+    return rules.min_coverage - _FLOAT32 <= coverage <= rules.max_coverage + _FLOAT32
 
 
 def _through(episodes: Sequence[Episode], viewpoint: str) -> list[Episode]:
@@ -164,12 +169,17 @@ def _target_fits(
 
 
 def _draw_target(
-    scan: Scan, viewpoint: str, test: Sequence[Episode], rules: InstanceRules, seed: int
+    scan: Scan,
+    viewpoint: str,
+    among: Sequence[str],
+    test: Sequence[Episode],
+    rules: InstanceRules,
+    seed: int,
 ) -> str | None:
     graph = scan.house.graph
     fitting = [
         target
-        for target in graph.viewpoints
+        for target in among
         if graph.distance(viewpoint, target) >= rules.target_distance
         and len(graph.shortest_path(viewpoint, target)) - 1 <= rules.max_steps
         and sum(_target_fits(scan, e, viewpoint, target, rules) for e in test) >= rules.min_test

@@ -31,7 +31,7 @@ def load_config(file: Path, model: type[Config], overrides: Sequence[str] = ()) 
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise _first_error(file, error) from None
+        raise _deepest_error(file, error) from None
 
 
 def save_config(path: Path, config: Settings) -> None:
@@ -67,9 +67,13 @@ def _override(values: dict[str, Any], override: str) -> None:
         raise InputError(field=f"--set {key}", expected="a YAML value", received=text) from None
 
 
-def _first_error(file: Path, error: ValidationError) -> InputError:
-    first = error.errors()[0]
-    field = ".".join(map(str, first["loc"]))
-    if first["type"] == "extra_forbidden":
-        return InputError(file=file, field=field, expected="no such key", received=first["input"])
-    return InputError(file=file, field=field, expected=first["msg"], received=first["input"])
+def _deepest_error(file: Path, error: ValidationError) -> InputError:
+    """Of the alternatives of a union, the one that fits furthest is the one that was meant."""
+    found = max(error.errors(), key=lambda each: len(each["loc"]))
+    expected, received = found["msg"].removeprefix("Input should be "), found["input"]
+    if found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        expected = "no such key"
+    if found["type"] == "missing":
+        expected, received = "a value", "nothing"
+    field = ".".join(map(str, found["loc"]))
+    return InputError(file=file, field=field, expected=expected, received=received)

@@ -22,7 +22,7 @@ def given() -> World:
 
 @pytest.fixture(scope="module")
 def instance(given: World) -> AttackInstance:
-    through = tuple(e for e in given.episodes if WHERE in e.path)[::5]
+    through = tuple(e for e in given.episodes if WHERE in e.path)[::14]
     return AttackInstance(
         "a", "east", "chair_0", "chair", WHERE, 0.5, TRAJECTORY, through, through[:2], ()
     )

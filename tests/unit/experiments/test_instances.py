@@ -1,0 +1,204 @@
+"""The rules of an attack instance, on a 4 × 3 grid where every shortest path is an episode."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.houses import tiny_house
+from tests.worlds import grid_graph, walks
+from vlnhijack import seeds
+from vlnhijack.errors import InputError
+from vlnhijack.experiments.config import InstanceRules, PickedInstance
+from vlnhijack.experiments.instances import Scan, build, draw, pick
+from vlnhijack.threat import AttackInstance, guide
+
+CABINET, TABLE = "cabinet_0", "table_0"
+AT = "east06"
+KINDS = ("single_step", "trajectory")
+RULES = InstanceRules(min_train=3, min_test=1)
+
+
+@pytest.fixture(scope="module")
+def scan() -> Scan:
+    """Every fifth path is val_seen; the table fills 30 % and the cabinet 50 % everywhere."""
+    graph = grid_graph("east")
+    coverage = np.zeros((12, 36, 2), np.float32)
+    coverage[:, 13] = (0.5, 0.3)
+    episodes = walks(graph, shortest=3)
+    held_out = set(seeds.stream(0, "split").permutation(episodes[-1].path_id + 1)[::5].tolist())
+    return Scan(
+        house=replace(tiny_house(), name="east", graph=graph),
+        coverage=coverage,
+        train=[e for e in episodes if e.path_id not in held_out],
+        val_seen=[e for e in episodes if e.path_id in held_out],
+    )
+
+
+def rules(**changes: Any) -> InstanceRules:
+    return RULES.model_copy(update=changes)
+
+
+def built(scan: Scan, kind: Any, viewpoint: str = AT, seed: int = 0) -> AttackInstance:
+    instance = build(scan, kind, CABINET, viewpoint, RULES, seed)
+    assert instance is not None
+    return instance
+
+
+def places(scan: Scan, kind: Any) -> list[AttackInstance]:
+    """Every possible instance of the cabinet."""
+    found = [build(scan, kind, CABINET, v, RULES, 0) for v in scan.house.graph.viewpoints]
+    return [instance for instance in found if instance is not None]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_shared_with_test(scan: Scan, kind: Any) -> None:
+    for instance in places(scan, kind):
+        tested = {tuple(guide(instance, e)) for e in instance.test}
+        seen = {tuple(guide(instance, e)) for e in (*instance.train, *instance.validation)}
+        assert not tested & seen
+        assert set(instance.test) <= set(scan.val_seen)
+        assert {*instance.train, *instance.validation} <= set(scan.train)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_train_and_validation_split_by_paths(scan: Scan, kind: Any) -> None:
+    for instance in places(scan, kind):
+        train, validation = (
+            {e.path_id for e in part} for part in (instance.train, instance.validation)
+        )
+        assert train
+        assert not train & validation
+        assert len(validation) == np.ceil(0.2 * len(train | validation))
+
+
+def test_single_step_episodes_go_on_from_the_attack_viewpoint(scan: Scan) -> None:
+    instance = built(scan, "single_step")
+    assert instance.trajectory == ()
+    episodes = (*instance.train, *instance.validation, *instance.test)
+    assert all(AT in e.path[:-1] for e in episodes)
+    assert any(e.path[-1] == AT for e in scan.train)
+    expected = {e for e in scan.val_seen if AT in e.path[:-1]}
+    assert set(instance.test) == expected
+
+
+def test_all_the_support_is_used(scan: Scan) -> None:
+    instance = built(scan, "single_step")
+    tested = {tuple(guide(instance, e)) for e in instance.test}
+    expected = [
+        e
+        for e in scan.train
+        if AT in e.path[:-1] and tuple(e.path[: e.path.index(AT) + 1]) not in tested
+    ]
+    assert len(expected) < sum(AT in e.path[:-1] for e in scan.train), "some were left out"
+    assert sorted((*instance.train, *instance.validation), key=str) == sorted(expected, key=str)
+
+
+def test_attack_trajectories_lead_away(scan: Scan) -> None:
+    graph = scan.house.graph
+    instances = places(scan, "trajectory")
+    assert len(instances) > 3
+    for instance in instances:
+        target = instance.trajectory[-1]
+        assert instance.target_path == graph.shortest_path(instance.viewpoint, target)
+        assert 1 <= len(instance.trajectory) <= RULES.max_steps
+        assert graph.distance(instance.viewpoint, target) >= 3
+        for episode in instance.test:
+            assert graph.distance(target, episode.path[-1]) >= 3
+            assert target not in episode.path[episode.path.index(instance.viewpoint) :]
+
+
+def test_too_few_episodes_give_no_instance(scan: Scan) -> None:
+    instance = built(scan, "single_step")
+    support = (*instance.train, *instance.validation)
+    enough = {
+        "min_test": len(instance.test),
+        "min_train": len(support),
+        "min_paths": len({e.path_id for e in support}),
+    }
+    for name, count in enough.items():
+        exact, more = rules(**{name: count}), rules(**{name: count + 1})
+        assert build(scan, "single_step", CABINET, AT, exact, 0) is not None
+        assert build(scan, "single_step", CABINET, AT, more, 0) is None, name
+
+
+@pytest.mark.parametrize(
+    ("share", "changes", "allowed"),
+    [
+        (0.4, {}, True),
+        (0.399, {}, False),
+        (0.7, {"min_coverage": 0.7}, True),
+        (0.6, {"max_coverage": 0.6}, True),
+        (0.601, {"max_coverage": 0.6}, False),
+        (0.5, {"categories": ("table",)}, False),
+    ],
+)
+def test_the_object_has_to_fill_its_view(
+    scan: Scan, share: float, changes: dict[str, Any], allowed: bool
+) -> None:
+    """0.6 and 0.7 are no float32 numbers: the thresholds allow for their rounding."""
+    coverage = np.zeros_like(scan.coverage)
+    coverage[scan.house.graph.row(AT), 20, 0] = share
+    scan = replace(scan, coverage=coverage)
+    if not allowed:
+        with pytest.raises(InputError, match="all there are"):
+            draw([scan], "single_step", 1, rules(**changes), seed=0)
+        return
+    (instance,) = draw([scan], "single_step", 1, rules(**changes), seed=0)
+    assert (instance.object_id, instance.viewpoint, instance.category) == (CABINET, AT, "cabinet")
+    assert instance.coverage == pytest.approx(share)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_seed_draws_the_instances(scan: Scan, kind: Any) -> None:
+    everything = rules(min_coverage=0.2)
+    first, again, other = (draw([scan], kind, 6, everything, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert [i.id for i in first] != [i.id for i in other]
+    assert {i.object_id for i in first[:2]} == {CABINET, TABLE}, "every object before a second"
+    assert len({i.id for i in first}) == 6
+    assert draw([scan], kind, 3, everything, seed=1) == first[:3]
+
+
+def test_more_than_there_are_is_refused(scan: Scan) -> None:
+    count = len(places(scan, "single_step"))
+    assert len(draw([scan], "single_step", count, RULES, seed=0)) == count
+    with pytest.raises(InputError, match=rf"instances\.count: expected ≤ {count}, all there are"):
+        draw([scan], "single_step", count + 1, RULES, seed=0)
+
+
+def picked(**changes: Any) -> PickedInstance:
+    given = {"kind": "single_step", "house": "east", "object": CABINET, "viewpoint": AT}
+    return PickedInstance.model_validate(given | changes)
+
+
+def test_a_picked_instance_is_the_one_of_its_place(scan: Scan) -> None:
+    assert pick(scan, picked(), RULES, seed=0) == built(scan, "single_step")
+    drawn = built(scan, "trajectory")
+    wanted = picked(kind="trajectory", target=drawn.trajectory[-1])
+    assert pick(scan, wanted, RULES, seed=0) == drawn
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"object": "sofa_9"}, "object: expected one of cabinet_0, table_0, received 'sofa_9'"),
+        ({"viewpoint": "nowhere"}, "viewpoint: .*nowhere"),
+        ({"kind": "trajectory", "target": "nowhere"}, "viewpoint: .*nowhere"),
+        ({"object": TABLE}, "table_0 at east06: expected .*, received 'a table, coverage 0.30"),
+        ({"kind": "trajectory", "target": "east07"}, "too few episodes"),
+        ({"kind": "trajectory", "target": AT}, "too few episodes"),
+    ],
+)
+def test_a_picked_instance_that_breaks_a_rule_is_refused(
+    scan: Scan, changes: dict[str, Any], expected: str
+) -> None:
+    """east07 is a neighbour of east06, nearer than 3 m."""
+    with pytest.raises(InputError, match=f"^east: .*{expected}"):
+        pick(scan, picked(**changes), RULES, seed=0)
+
+
+def test_a_picked_object_is_of_the_categories(scan: Scan) -> None:
+    with pytest.raises(InputError, match="received 'a cabinet"):
+        pick(scan, picked(), rules(categories=("table",)), seed=0)
