@@ -16,6 +16,7 @@ def results() -> dict:
     """What the cell tagged "results" prints, in the small settings."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VLNHIJACK_NOTEBOOK", "small")
+        patch.setenv("OMP_NUM_THREADS", "1")
         notebook = nbformat.read(NOTEBOOK, as_version=4)
         NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
     (cell,) = (c for c in notebook.cells if "results" in c.metadata.get("tags", []))
