@@ -97,6 +97,8 @@ def tiny_agent(*, no_lang_ca: bool = False, seed: int = 0, scale: float = 0.3) -
     for parameter in [*encoder.parameters(), *policy.parameters()]:
         if parameter.dim() > 1:
             torch.nn.init.normal_(parameter, std=scale, generator=generator)
+    with torch.no_grad():
+        policy.next_action.net[4].weight *= 8
     for model in (encoder, policy):
         model.eval().requires_grad_(False)
     return Agent(encoder, policy, vocabulary, {}, Path("tiny.safetensors"))

@@ -48,8 +48,10 @@ def test_a_batch_walks_as_each_of_its_episodes_alone(given: World) -> None:
 
 
 def test_a_sampled_move_is_drawn_from_the_policy(given: World) -> None:
-    episode, count = given.episodes[2], 1500
-    step, logits = logits_along(given, episode, [episode.path[0]])[0]
+    count = 1500
+    first = {e: logits_along(given, e, [e.path[0]])[0] for e in given.episodes[::9]}
+    episode = min(first, key=lambda e: abs(first[e][1].softmax(0).max() - 0.7))
+    step, logits = first[episode]
     expected = logits[: len(step.exits) + 1].softmax(0).numpy()
     paths = walk(
         given,
@@ -63,7 +65,7 @@ def test_a_sampled_move_is_drawn_from_the_policy(given: World) -> None:
     for path in paths:
         counts[ends.index(path[1] if len(path) > 1 else None)] += 1
     spread = np.sqrt(expected * (1 - expected) / count)
-    assert 0.05 < expected.max() < 0.95
+    assert 0.6 < expected.max() < 0.8, "neither uniform nor certain"
     assert (np.abs(counts / count - expected) < 4 * spread + 1e-9).all()
 
 

@@ -13,7 +13,7 @@ from vlnhijack.evaluation.ablations import (
 )
 from vlnhijack.navigation.episode import Episode
 
-OBJECTS = {"chair": "chair", "armchair": "chair", "lamp": "lamp", "floor lamp": "lamp"}
+OBJECTS = {"chair": "chair", "armchair": "chair", "lamp": "lamp", "lamp stand": "lamp"}
 ROOMS = {"kitchen": "kitchen", "hall": "hallway", "hallway": "hallway"}
 GROUPS = (OBJECTS, ROOMS)
 
@@ -40,13 +40,13 @@ def test_a_shuffled_instruction_is_that_of_another_path_of_the_scan(given: World
 
 
 def test_object_and_room_words_change_their_category_and_no_other_word_changes() -> None:
-    text = "Pass the armchair and the floor lamp, then enter the hallway; chairlift."
+    text = "Pass the armchair and the lamp stand, then enter the hallway; chairlift."
     replaced = [e.instruction for e in replace_words(instructions(text), GROUPS, seed=0)]
     pattern = re.compile(r"Pass the (.+) and the (.+), then enter the (.+); chairlift\.")
     found = [pattern.fullmatch(sentence) for sentence in replaced]
     words = [match.groups() for match in found if match]
     assert len(words) == len(replaced)
-    assert {seat for seat, _, _ in words} == {"lamp", "floor lamp"}
+    assert {seat for seat, _, _ in words} == {"lamp", "lamp stand"}
     assert {light for _, light, _ in words} == {"chair", "armchair"}
     assert {room for _, _, room in words} == {"kitchen"}
 
@@ -54,7 +54,7 @@ def test_object_and_room_words_change_their_category_and_no_other_word_changes()
 def test_words_are_found_in_any_case() -> None:
     replaced = replace_words(instructions("Chair. Stop at the KITCHEN", 1), GROUPS, seed=0)
     assert replaced[0].instruction in (
-        f"{light}. Stop at the {room}" for light in ("lamp", "floor lamp") for room in ROOMS
+        f"{light}. Stop at the {room}" for light in ("lamp", "lamp stand") for room in ROOMS
     )
 
 

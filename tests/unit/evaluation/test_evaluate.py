@@ -22,7 +22,7 @@ def given() -> World:
 
 @pytest.fixture(scope="module")
 def instance(given: World) -> AttackInstance:
-    through = tuple(e for e in given.episodes if WHERE in e.path)[::14]
+    through = tuple(e for e in given.episodes if WHERE in e.path)[::4]
     return AttackInstance(
         "a", "east", "chair_0", "chair", WHERE, 0.5, TRAJECTORY, through, through[:2], ()
     )
@@ -41,7 +41,7 @@ def test_a_record_tells_what_the_agent_did_after_its_guide(
 ) -> None:
     graph = given.table.graphs["east"]
     episodes = [*instance.train, *instance.validation]
-    assert {record.stopped for record in records} == {False, True}
+    assert {1, 2} < {len(record.path) for record in records}
     for record, episode in zip(records, episodes, strict=True):
         at = episode.path.index(WHERE)
         walked = act(given, episode, list(episode.path[: at + 1]))

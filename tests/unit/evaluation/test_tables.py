@@ -40,7 +40,7 @@ def experiment() -> pd.DataFrame:
         records += rows(3, **base, arm="attacked", stopped=bool(stops), attack_ndtw=0.8, **hit)
         records += rows(1, **base, arm="attacked", attack_oracle_success=1.0, attack_ndtw=0.4)
         records += rows(5, **base, arm="attacked", condition="Train", stopped=True)
-        records += rows(1, **base, arm="noise_texel", condition="Train", stopped=True)
+        records += rows(20, **base, arm="noise_texel", condition="Train", stopped=True)
     return pd.DataFrame(records)
 
 
@@ -77,18 +77,19 @@ def test_the_noise_that_is_stronger_on_test_counts_for_each_kind() -> None:
     noise = kept[kept["arm"] == "noise"]
     single, trajectory = (noise[noise["kind"] == k] for k in ("single_step", "trajectory"))
     assert len(single) == 4, "block noise, which has no Train records"
-    assert list(trajectory["condition"]) == ["Test"] * 4 + ["Train"]
+    assert list(trajectory["condition"]) == ["Test"] * 4 + ["Train"] * 20
 
 
 def test_an_interval_contains_the_mean_and_shrinks_with_n() -> None:
     random = seeds.stream(0, "intervals")
     widths = []
-    for count in (20, 500):
+    for count in (40, 1000):
         stopped = random.random(count) < 0.3
         records = pd.DataFrame(rows(count)).assign(stopped=stopped)
         low, high = interval(records, "stopped")
         assert low <= stopped.mean() <= high
-        assert high - low == pytest.approx(2 * 1.96 * np.sqrt(0.21 / count), rel=0.3)
+        expected = 2 * 1.96 * np.sqrt(stopped.var() / count)
+        assert high - low == pytest.approx(expected, rel=0.12)
         widths.append(high - low)
     assert widths[1] < widths[0] / 3
 

@@ -46,9 +46,11 @@ def built(scan: Scan, kind: Any, viewpoint: str = AT, seed: int = 0) -> AttackIn
     return instance
 
 
-def places(scan: Scan, kind: Any) -> list[AttackInstance]:
+def places(
+    scan: Scan, kind: Any, rules: InstanceRules = RULES, seed: int = 0
+) -> list[AttackInstance]:
     """Every possible instance of the cabinet."""
-    found = [build(scan, kind, CABINET, v, RULES, 0) for v in scan.house.graph.viewpoints]
+    found = [build(scan, kind, CABINET, v, rules, seed) for v in scan.house.graph.viewpoints]
     return [instance for instance in found if instance is not None]
 
 
@@ -95,14 +97,16 @@ def test_all_the_support_is_used(scan: Scan) -> None:
     assert sorted((*instance.train, *instance.validation), key=str) == sorted(expected, key=str)
 
 
-def test_attack_trajectories_lead_away(scan: Scan) -> None:
+@pytest.mark.parametrize("longest", [2, 5])
+def test_attack_trajectories_lead_away(scan: Scan, longest: int) -> None:
     graph = scan.house.graph
-    instances = places(scan, "trajectory")
-    assert len(instances) > 3
+    limited = rules(max_steps=longest)
+    instances = [i for seed in range(6) for i in places(scan, "trajectory", limited, seed)]
+    assert len({(i.viewpoint, i.trajectory) for i in instances}) > 10
     for instance in instances:
         target = instance.trajectory[-1]
         assert instance.target_path == graph.shortest_path(instance.viewpoint, target)
-        assert 1 <= len(instance.trajectory) <= RULES.max_steps
+        assert 1 <= len(instance.trajectory) <= longest
         assert graph.distance(instance.viewpoint, target) >= 3
         for episode in instance.test:
             assert graph.distance(target, episode.path[-1]) >= 3

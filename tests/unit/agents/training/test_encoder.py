@@ -35,17 +35,18 @@ def views() -> ViewTargets:
     )
 
 
-def train(data: ViewTargets, seed: int) -> tuple[list[float], Tensor]:
+def train(data: ViewTargets, seed: int, before: int = 0) -> tuple[list[float], Tensor]:
+    """Losses and final weights of a training that finds torch's generator in any state."""
     torch.manual_seed(0)
     vit = VisionTransformer(VIT)
+    torch.manual_seed(before)
     losses = [loss for _, loss in train_encoder(vit, data, CATEGORIES, ROOMS, SCHEDULE, seed)]
     return losses, torch.nn.utils.parameters_to_vector(vit.parameters()).detach()
 
 
 def test_training_lowers_the_loss_and_repeats_itself() -> None:
     losses, weights = train(views(), seed=1)
-    torch.rand(7)
-    again, same_weights = train(views(), seed=1)
+    again, same_weights = train(views(), seed=1, before=7)
     assert len(losses) == SCHEDULE.epochs * VIEWS // SCHEDULE.batch
     assert np.mean(losses[-3:]) < 0.8 * np.mean(losses[:3])
     assert losses == again
