@@ -16,7 +16,7 @@ $(STAMP): pyproject.toml constraints.txt tools/setup.sh
 	@touch $@
 
 demo: setup ## hijack an agent in a shipped house
-	$(BIN)/vlnhijack run experiments/quickstart.yaml
+	$(BIN)/vlnhijack run experiments/quickstart.yaml --resume
 
 check: setup ## format, lint, types, import directions, fast unit tests
 	$(BIN)/ruff format --check .
@@ -31,8 +31,8 @@ test: setup ## every test that is not slow
 test-all: setup ## every test
 	$(PYTEST)
 
-bench: setup ## times of the renderers, into bench/
-	$(BIN)/python tools/bench.py --out bench
+bench: setup ## time, memory and error of the renderers, into bench/
+	$(BIN)/vlnhijack bench render scenes/alder --out bench
 
 clean: ## remove .venv and caches; runs/ stays
 	rm -rf $(VENV) bench *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

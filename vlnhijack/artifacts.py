@@ -68,6 +68,25 @@ def read_json(path: Path) -> Any:
         raise InputError(f"not valid JSON ({error})", file=path) from None
 
 
+def append_row(path: Path, row: dict[str, Any]) -> None:
+    """Add a line to a JSONL file."""
+    with path.open("a") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Rows of a JSONL file; a last line cut off by a crash is dropped, a missing file is empty."""
+    if not path.exists():
+        return []
+    rows = []
+    for line in path.read_text().splitlines():
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError:
+            break
+    return rows
+
+
 def sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's content."""
     with path.open("rb") as file:

@@ -7,7 +7,7 @@ import typer
 from typer.core import TyperGroup
 
 from vlnhijack import __version__
-from vlnhijack.cli import agent, doctor, house
+from vlnhijack.cli import agent, bench, doctor, house
 from vlnhijack.cli.run import run
 from vlnhijack.errors import VlnHijackError
 
@@ -46,6 +46,7 @@ app = typer.Typer(
 app.command()(run)
 app.add_typer(house.app, name="house")
 app.add_typer(agent.app, name="agent")
+app.add_typer(bench.app, name="bench")
 app.command()(doctor.doctor)
 
 

@@ -29,7 +29,9 @@ def train(
 
 @app.command("eval")
 def evaluate(
-    agent: Annotated[str, typer.Argument(help="A shipped agent, or a .safetensors file.")] = "small",
+    agent: Annotated[
+        str, typer.Argument(help="A shipped agent, or a .safetensors file.")
+    ] = "small",
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 16,
     seed: Annotated[int, typer.Option()] = 1,
 ) -> None:

@@ -10,9 +10,7 @@ from vlnhijack.cli.console import console, progress_bars
 
 def run(
     experiment: Annotated[Path, typer.Argument(help="Experiment file (YAML).")],
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder; runs/<name> by default.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; runs/<name> by default.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the run in the folder, if there is one.")
     ] = False,

@@ -12,7 +12,14 @@ from rich.progress import TaskID
 from safetensors.torch import load_file, save
 from torch import Tensor
 
-from vlnhijack.artifacts import read_json, write_bytes, write_json, write_text
+from vlnhijack.artifacts import (
+    append_row,
+    read_json,
+    read_rows,
+    write_bytes,
+    write_json,
+    write_text,
+)
 from vlnhijack.attack.objective import Objective, attack_objective
 from vlnhijack.attack.optimise import (
     AttackedViews,
@@ -171,7 +178,7 @@ def _checkpointed(
         )
         if row.iteration % schedule.checkpoint_every == 0 or row.iteration == schedule.iterations:
             found = _validate(context, instance, validation, held_out, texture, row.iteration)
-            _save_checkpoint(files, texture, found, time.perf_counter() - started)
+            _save_checkpoint(files, texture, found, seed, time.perf_counter() - started)
         yield row
 
 
@@ -198,9 +205,11 @@ def _validate(
 
 
 def _save_checkpoint(
-    files: AttackFiles, texture: ProjectedAdam, found: Validation, seconds: float
+    files: AttackFiles, texture: ProjectedAdam, found: Validation, seed: int, seconds: float
 ) -> None:
-    write_bytes(files.state(found.iteration), save(texture.state()))
+    """Texture, Adam's state, and what the random streams hang on: seed and iteration."""
+    streams = {"seed": str(seed), "iteration": str(found.iteration)}
+    write_bytes(files.state(found.iteration), save(texture.state(), streams))
     write_exr(files.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
     append_row(files.validations, {**found._asdict(), "seconds": seconds})
 
@@ -219,21 +228,3 @@ def _resume(files: AttackFiles, texture: ProjectedAdam, first: int) -> float:
 
 def _validation_fields(row: dict) -> tuple[int, float, float]:
     return row["iteration"], row["ndtw"], row["loss"]
-
-
-def append_row(path: Path, row: dict) -> None:
-    with path.open("a") as file:
-        file.write(json.dumps(row) + "\n")
-
-
-def read_rows(path: Path) -> list[dict]:
-    """Rows of a JSONL file; a last line cut off by a crash is dropped, a missing file is empty."""
-    if not path.exists():
-        return []
-    rows = []
-    for line in path.read_text().splitlines():
-        try:
-            rows.append(json.loads(line))
-        except json.JSONDecodeError:
-            break
-    return rows

@@ -2,7 +2,8 @@
 
 import pandas as pd
 
-from vlnhijack.experiments.attack_stage import AttackFiles, read_rows
+from vlnhijack.artifacts import read_rows
+from vlnhijack.experiments.attack_stage import AttackFiles
 from vlnhijack.experiments.context import Context
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.observe import render_views

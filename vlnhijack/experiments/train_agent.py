@@ -5,7 +5,7 @@ interrupted training goes on where it was.
 """
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,14 @@ from vlnhijack.agents.training.encoder import EncoderSchedule, ViewTargets, trai
 from vlnhijack.agents.training.imitation import ImitationSchedule, Lessons, train_policy
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
-from vlnhijack.artifacts import read_json, write_bytes, write_json
+from vlnhijack.artifacts import append_row, read_json, write_bytes, write_json
 from vlnhijack.evaluation.ablations import ablate, blank_features, rates
 from vlnhijack.experiments.views import view_targets
 from vlnhijack.experiments.yaml_config import Settings, save_config
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
+from vlnhijack.scenes.procedural.episodes import reword
 from vlnhijack.scenes.procedural.furniture import CATEGORIES
 from vlnhijack.scenes.procedural.phrases import ROOM_WORDS, word_groups
 from vlnhijack.settings import house_folder
@@ -51,6 +52,7 @@ class AgentConfig(Settings):
     """What `vlnhijack agent train` needs; see experiments/small_agent.yaml.
 
     vit and policy hold the options of VitConfig and HamtConfig that differ from their defaults;
+    reworded further instructions are written for each training path;
     blind trains the control that never sees anything but a mid-grey image.
     """
 
@@ -63,6 +65,7 @@ class AgentConfig(Settings):
     policy: dict[str, Any]
     encoder: EncoderSchedule
     imitation: ImitationSchedule
+    reworded: int = 0
     blind: bool = False
 
 
@@ -79,6 +82,7 @@ def train_agent(config: AgentConfig, folder: Path, progress: Progress) -> Agent:
     vit = _encoder(config, [data[name] for name in config.train_houses], folder, progress)
     features = _features(vit, list(data.values()), folder)
     train = _episodes(houses, config.train_houses, "train")
+    train += _reworded(config, houses, train, folder, progress)
     vocabulary = Vocabulary.build(episode.instruction for episode in train)
     hamt = Hamt(HamtConfig.from_mapping({"vocab_size": len(vocabulary), **config.policy}))
     agent = Agent(
@@ -125,6 +129,26 @@ def _episodes(houses: dict[str, House], names: Sequence[str], split: str) -> lis
             house_folder(name) / "episodes" / f"{split}.json", {name: houses[name].graph}
         )
     ]
+
+
+def _reworded(
+    config: AgentConfig,
+    houses: dict[str, House],
+    episodes: Sequence[Episode],
+    folder: Path,
+    progress: Progress,
+) -> list[Episode]:
+    found: list[Episode] = []
+    for name in config.train_houses:
+        path = folder / "reworded" / f"{name}.json"
+        if not path.exists():
+            task = progress.add_task(f"instructions in {name}", total=None)
+            own = [episode for episode in episodes if episode.scan == name]
+            further = reword(houses[name], own, config.seed, config.reworded)
+            write_json(path, [asdict(episode) for episode in further])
+            progress.update(task, total=1, completed=1)
+        found += [Episode(**{**row, "path": tuple(row["path"])}) for row in read_json(path)]
+    return found
 
 
 def _views(config: AgentConfig, house: House, folder: Path, progress: Progress) -> ViewTargets:
@@ -201,7 +225,7 @@ def _policy(
     )
     first = _restore(folder, policy, optimiser)
     task = progress.add_task("policy", total=schedule.steps, completed=first)
-    smooth = None
+    losses: list[float] = []
     for step, loss in train_policy(
         policy,
         Lessons(table, features, agent.vocabulary, episodes),
@@ -210,10 +234,12 @@ def _policy(
         optimiser,
         first_step=first,
     ):
-        smooth = loss if smooth is None else 0.98 * smooth + 0.02 * loss
-        progress.update(task, completed=step, description=f"policy, loss {smooth:.3f}")
+        losses.append(loss)
+        recent = sum(losses[-50:]) / len(losses[-50:])
+        progress.update(task, completed=step, description=f"policy, loss {recent:.3f}")
         if step % _SAVE_EVERY == 0 or step == schedule.steps:
             _checkpoint(folder, policy, optimiser, step)
+            append_row(folder / "policy_loss.jsonl", {"step": step, "loss": recent})
     policy.eval().requires_grad_(False)
 
 

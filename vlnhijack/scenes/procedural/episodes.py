@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,7 @@ from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.procedural.facts import stop_facts
-from vlnhijack.scenes.procedural.instructions import write_instructions
+from vlnhijack.scenes.procedural.instructions import write_instruction, write_instructions
 from vlnhijack.scenes.procedural.landmarks import Landmarks, find_landmarks
 
 STEPS = range(4, 8)  # viewpoints of a path
@@ -48,6 +49,24 @@ def make_episodes(
         for number, path in enumerate([*train, *sorted(held_out)])
     ]
     return sum(episodes[: len(train)], []), sum(episodes[len(train) :], [])
+
+
+def reword(house: House, episodes: Iterable[Episode], seed: int, count: int) -> list[Episode]:
+    """`count` further episodes for each path: another first heading, another instruction.
+
+    They augment training, as the speaker's instructions do for R2R agents (Fried et al. 2018).
+    """
+    landmarks = find_landmarks(house)
+    paths = {episode.path_id: episode for episode in episodes}
+    further = []
+    for path_id, episode in paths.items():
+        for number in range(count):
+            rng = seeds.stream(seed, "reworded", path_id, number)
+            heading = _first_heading(landmarks, episode.path, rng)
+            text, _ = write_instruction(landmarks, episode.path, heading, rng)
+            name = f"{path_id}_reworded_{number}"
+            further.append(replace(episode, heading=heading, instruction=text, instruction_id=name))
+    return further
 
 
 def viewpoint_overlap(train: Iterable[Episode], other: Sequence[Episode]) -> float:
@@ -89,15 +108,19 @@ def _spread(paths: list[Path], count: int, rng: np.random.Generator) -> list[Pat
 
 
 def _episodes(landmarks: Landmarks, path: Path, path_id: int, seed: int) -> list[Episode]:
-    """Half of the walks start looking along the path, roughly; half in any direction."""
     graph = landmarks.house.graph
     rng = seeds.stream(seed, "instructions", landmarks.house.name, *path)
-    along = float(heading_of(landmarks.position(path[1]) - landmarks.position(path[0])))
-    heading = along + rng.normal(0, 0.25) if rng.random() < 0.5 else rng.uniform(0, 2 * np.pi)
-    heading = round(float(heading % (2 * np.pi)), 4)
+    heading = _first_heading(landmarks, path, rng)
     texts = write_instructions(landmarks, path, heading, rng, INSTRUCTIONS)
     distance = round(graph.distance(path[0], path[-1]), 2)
     return [
         Episode(path_id, graph.scan, path, heading, text, f"{path_id}_{number}", distance)
         for number, text in enumerate(texts)
     ]
+
+
+def _first_heading(landmarks: Landmarks, path: Path, rng: np.random.Generator) -> float:
+    """Half of the walks start looking along the path, roughly; half in any direction."""
+    along = float(heading_of(landmarks.position(path[1]) - landmarks.position(path[0])))
+    heading = along + rng.normal(0, 0.25) if rng.random() < 0.5 else rng.uniform(0, 2 * np.pi)
+    return round(float(heading % (2 * np.pi)), 4)
