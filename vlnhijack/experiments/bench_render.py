@@ -19,14 +19,15 @@ from vlnhijack.rendering.coverage import object_coverage
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.memory import peak, restart_peak
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
+from vlnhijack.rendering.mitsuba_scene import shared_scene
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.house import House
 
 SPPS = (4, 16)
 REPETITIONS = 5
-REFERENCE_SPP = 16
-REFERENCE_BATCHES = 64
+REFERENCE_SPP = 64
+REFERENCE_BATCHES = 16
 _RUNGS: dict[str, Callable[..., Renderer]] = {"frozen": FrozenRenderer, "prb": MitsubaRenderer}
 
 
@@ -34,10 +35,9 @@ _RUNGS: dict[str, Callable[..., Renderer]] = {"frozen": FrozenRenderer, "prb": M
 class Row:
     """Medians of one rung at one number of samples per pixel.
 
-    Seconds of an image, of an image with its gradient, and of building the renderer; memory_mb is
-    the peak of an image with its gradient above the process before the renderer was built (10⁶
-    bytes). The frozen operator is built from the scene that all readers of a house share, `prb`
-    loads its own.
+    Seconds of an image, of an image with its gradient, and of building the renderer with its scene;
+    memory_mb is the peak of an image with its gradient above the process before the renderer was
+    built (10⁶ bytes).
 
     Against the reference: RMSE and PSNR (dB) of the image in display values; cosine and norm ratio
     of the gradient of a fixed random linear functional of the image.
@@ -127,7 +127,9 @@ def bench_render(
     weights = seeds.stream(0, "bench functional").standard_normal((1, 3, height, width))
     subject = _Subject(house, object_id, camera, torch.from_numpy(weights).float())
     cases = list(product(_RUNGS, spps))
-    task = progress.add_task("renderers", total=len(cases) * (1 + REPETITIONS) + REFERENCE_BATCHES)
+    task = progress.add_task(
+        "renderers", total=len(cases) * (1 + REPETITIONS) + 2 * REFERENCE_BATCHES
+    )
     for rung, spp in cases:
         _time(subject, rung, spp, seeds.integer(0, "bench warm-up"))
         progress.advance(task)
@@ -143,13 +145,17 @@ def bench_render(
 
 def _reference(subject: _Subject, advance: Callable[[], None]) -> tuple[Tensor, Tensor]:
     """Image and gradient, means over batches of camera rays that no renderer is measured at."""
-    renderer = subject.renderer("prb", REFERENCE_SPP, 0)
+    batches = [seeds.integer(0, "bench reference", batch) for batch in range(REFERENCE_BATCHES)]
     image, gradient = torch.zeros_like(subject.weights), torch.zeros_like(subject.texture())
-    for batch in range(REFERENCE_BATCHES):
-        seed = seeds.integer(0, "bench reference", batch)
-        renderer.seed = seed
-        image += render_views(subject.house, [subject.camera], REFERENCE_SPP, seed)
+    _clear()
+    renderer = subject.renderer("prb", REFERENCE_SPP, 0)
+    for renderer.seed in batches:
         gradient += subject.gradient(renderer)[1]
+        advance()
+    del renderer
+    _clear()
+    for seed in batches:
+        image += render_views(subject.house, [subject.camera], REFERENCE_SPP, seed)
         advance()
     return image / REFERENCE_BATCHES, gradient / REFERENCE_BATCHES
 
@@ -177,7 +183,7 @@ def _time(
     subject: _Subject, rung: str, spp: int, seed: int
 ) -> tuple[dict[str, float], Tensor, Tensor]:
     """Costs as named in Row, image and gradient; the first call of a new renderer is not timed."""
-    before = restart_peak()
+    before = _clear()
     renderer, build = _seconds(lambda: subject.renderer(rung, spp, seed))
     restart_peak()
     (image, gradient), _ = _seconds(lambda: subject.gradient(renderer))
@@ -192,6 +198,12 @@ def _time(
         "memory_mb": memory,
     }
     return costs, image, gradient
+
+
+def _clear() -> float:
+    """Drop unused scenes, since Mitsuba's kernels hold the surfaces of all; resident megabytes."""
+    shared_scene.cache_clear()
+    return restart_peak()
 
 
 def _seconds(work: Callable[[], Any]) -> tuple[Any, float]:
