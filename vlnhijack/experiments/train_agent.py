@@ -264,7 +264,8 @@ def _restore(folder: Path, policy: Hamt, optimiser: torch.optim.Optimizer) -> in
         }
     )
     for name, parameter in policy.named_parameters():
-        optimiser.state[parameter] = {
-            key: tensors[f"optimiser.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
-        }
+        if f"optimiser.step.{name}" in tensors:
+            optimiser.state[parameter] = {
+                key: tensors[f"optimiser.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
+            }
     return int(read_json(folder / "policy.json")["step"])

@@ -41,7 +41,8 @@ class ProxyHeads(nn.Module):
         self.sizes = [categories, categories, rooms]
 
     def loss(self, tokens: Tensor, fractions: Tensor, depth: Tensor, rooms: Tensor) -> Tensor:
-        """Sum of the five losses for tokens (V,1+P,D)."""
+        """Weighted sum of the five losses for tokens (V,1+P,D); presence, a mean over many
+        categories that are mostly absent, weighs most."""
         patch = self.patch(tokens[:, 1:])
         present_logit, extent, room = self.view(tokens[:, 0]).split(self.sizes, dim=1)
         share = fractions[..., :-1].mean(1)
@@ -49,9 +50,9 @@ class ProxyHeads(nn.Module):
         return (
             F.cross_entropy(patch[..., :-1].flatten(0, 1), fractions.flatten(0, 1))
             + F.mse_loss(patch[..., -1], depth)
-            + F.binary_cross_entropy_with_logits(present_logit, present)
+            + 5 * F.binary_cross_entropy_with_logits(present_logit, present)
             + F.mse_loss(extent, (share + 1e-3).log()) / 4
-            + F.cross_entropy(room, rooms)
+            + F.cross_entropy(room, rooms) / 2
         )
 
 
