@@ -56,18 +56,18 @@ def test_without_an_active_bound_it_is_adam() -> None:
 
 def test_a_saved_state_continues_to_the_bit() -> None:
     steps = gradients(30, seed=5)
-    whole, original, used = texture(epsilon=0.1, lr=0.01)
+    whole, _, used = texture(epsilon=0.1, lr=0.004)
     for gradient in steps[:13]:
         whole.step(gradient)
     state = whole.state()
     kept = {name: tensor.clone() for name, tensor in state.items()}
-    resumed, *_ = texture(epsilon=0.1, lr=0.01)
+    resumed, *_ = texture(epsilon=0.1, lr=0.004)
     resumed.load(state)
     for gradient in steps[13:]:
         whole.step(gradient)
         resumed.step(gradient)
     assert torch.equal(whole.value, resumed.value)
-    change = (whole.value - original).abs()[used]
-    assert 0.1 < (change > 0.0999).float().mean() < 0.9, "some texels met a bound"
+    free = (whole.value > whole.lower) & (whole.value < whole.upper)
+    assert 0.1 < free[used].float().mean() < 0.9, "some texels met a bound"
     for name, tensor in kept.items():
         assert torch.equal(state[name], tensor), f"{name} was changed by later steps"

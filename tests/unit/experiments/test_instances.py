@@ -75,6 +75,13 @@ def test_train_and_validation_split_by_paths(scan: Scan, kind: Any) -> None:
         assert len(validation) == np.ceil(0.2 * len(train | validation))
 
 
+def test_the_seed_splits_the_support(scan: Scan) -> None:
+    splits = [built(scan, "single_step", seed=seed) for seed in (0, 0, 1, 2, 3)]
+    assert splits[0] == splits[1]
+    assert len({split.validation for split in splits}) > 1
+    assert len({frozenset({*split.train, *split.validation}) for split in splits}) == 1
+
+
 def test_single_step_episodes_go_on_from_the_attack_viewpoint(scan: Scan) -> None:
     instance = built(scan, "single_step")
     assert instance.trajectory == ()

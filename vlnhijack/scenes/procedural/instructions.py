@@ -11,7 +11,7 @@ from vlnhijack.scenes.procedural.phrases import GRAMMAR, object_word, phrase, ro
 
 MOST_WORDS, FEWEST_WORDS, MOST_CLAUSES = 35, 8, 4
 KEPT = {
-    "around": 0.5, "turn": 0.35, "straight": 0.15, "away": 0.3, "leave": 0.6, "enter": 0.65,
+    "around": 0.5, "turn": 0.65, "straight": 0.25, "away": 0.3, "leave": 0.6, "enter": 0.65,
     "cross": 0.4, "door": 0.2, "pass": 0.6, "between": 0.5, "toward": 0.6,
 }  # fmt: skip
 OTHER_SIDE = {"left": "right", "right": "left", "": ""}
