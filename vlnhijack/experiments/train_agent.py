@@ -15,7 +15,7 @@ from safetensors.torch import load_file, save
 from torch import Tensor
 
 from vlnhijack import __version__, seeds
-from vlnhijack.agents.checkpoints import Agent, save_agent
+from vlnhijack.agents.checkpoints import Agent, load_agent, save_agent
 from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
@@ -94,7 +94,7 @@ def train_agent(config: AgentConfig, folder: Path, progress: Progress) -> Agent:
     metadata = measure(config, agent, table, features, houses)
     save_agent(agent.path, vit, hamt, vocabulary, metadata)
     write_json(folder / "rates.json", metadata)
-    return agent
+    return load_agent(agent.path)
 
 
 def measure(
