@@ -32,7 +32,7 @@ test-all: setup ## every test
 	$(PYTEST)
 
 bench: setup ## time, memory and error of the renderers, into bench/
-	$(BIN)/vlnhijack bench render scenes/alder --out bench
+	$(BIN)/vlnhijack bench render scenes/cedar --out bench
 
 clean: ## remove .venv and caches; runs/ stays
 	rm -rf $(VENV) bench *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -217,8 +217,9 @@ def _save_checkpoint(
 def _resume(files: AttackFiles, texture: ProjectedAdam, first: int) -> float:
     """Load the checkpoint of iteration `first` and forget what came after; seconds spent so far."""
     files.folder.mkdir(parents=True, exist_ok=True)
-    kept = [row for row in read_rows(files.log) if row["iteration"] <= first]
-    write_text(files.log, "".join(json.dumps(row) + "\n" for row in kept))
+    for path in (files.log, files.validations):
+        kept = [row for row in read_rows(path) if row["iteration"] <= first]
+        write_text(path, "".join(json.dumps(row) + "\n" for row in kept))
     if first == 0:
         return 0.0
     texture.load(load_file(files.state(first)))
