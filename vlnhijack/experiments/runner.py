@@ -40,7 +40,7 @@ def run(
     baseline gate or an apply check fails.
     """
     open_folder(config, folder, resume=resume)
-    torch.set_num_threads(config.threads)
+    make_repeatable(config.threads)
     context = load_context(config, folder, progress)
     instances = make_instances(context)
     write_json(folder / "instances.json", [asdict(instance) for instance in instances])
@@ -58,6 +58,13 @@ def run(
     summary = {**summarise(records), "seconds": seconds}
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def make_repeatable(threads: int) -> None:
+    """Equal threads, equal bits: scattered sums (the gradient of indexing) run in a fixed order."""
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    torch.utils.deterministic.fill_uninitialized_memory = False
 
 
 def open_folder(config: ExperimentConfig, folder: Path, *, resume: bool) -> None:
