@@ -145,7 +145,6 @@ class Hamt(nn.Module):
         self.encoder = Encoder(config)
         self.next_action = NextAction(config)
         self.apply(_initialise)
-        self.apply(_initialise)
 
     def encode_text(self, token_ids: Tensor, mask: Tensor) -> Text:
         """(B,T,H), or with no_lang_ca one such tensor per cross layer and a last, unread one."""
@@ -256,11 +255,3 @@ def _initialise(module: nn.Module) -> None:
     if isinstance(module, nn.Embedding) and module.padding_idx is not None:
         with torch.no_grad():
             module.weight[module.padding_idx] = 0
-
-
-def _initialise(module: nn.Module) -> None:
-    """BERT's: weights from N(0, 0.02), biases zero; an embedding of unit size would drown views."""
-    if isinstance(module, nn.Linear | nn.Embedding):
-        nn.init.normal_(module.weight, std=0.02)
-    if isinstance(module, nn.Linear):
-        nn.init.zeros_(module.bias)

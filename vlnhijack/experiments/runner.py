@@ -64,7 +64,6 @@ def make_repeatable(threads: int) -> None:
     """Equal threads, equal bits: scattered sums (the gradient of indexing) run in a fixed order."""
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
-    torch.utils.deterministic.fill_uninitialized_memory = False
 
 
 def open_folder(config: ExperimentConfig, folder: Path, *, resume: bool) -> None:
