@@ -2,12 +2,10 @@
 
 from typing import Protocol
 
-import torch.nn.functional as F
 from torch import Tensor, nn
 
+from vlnhijack.agents.resize import resize_and_crop
 from vlnhijack.agents.vit import VisionTransformer
-
-_CROP_FRACTION = 0.9
 
 
 class ViewEncoder(Protocol):
@@ -48,19 +46,3 @@ class VitEncoder(nn.Module):
 def normalise(images: Tensor) -> Tensor:
     """Display values in [0,1] to [-1,1]: mean = std = 0.5."""
     return images * 2 - 1
-
-
-def resize_and_crop(images: Tensor, size: tuple[int, int]) -> Tensor:
-    """(V,3,h,w) to (V,3,*size); images of that size already are left as they are.
-
-    timm's evaluation transform (antialiased bicubic, central 90 %: for 224, the shorter side to 248
-    and a centre crop) without its 8-bit rounding, so linear in the images and free to overshoot.
-    """
-    height, width = images.shape[-2:]
-    if (height, width) == size:
-        return images
-    scale = max(int(size[0] / _CROP_FRACTION) / height, int(size[1] / _CROP_FRACTION) / width)
-    scaled = (int(height * scale + 1e-6), int(width * scale + 1e-6))
-    images = F.interpolate(images, scaled, mode="bicubic", antialias=True)
-    top, left = round((scaled[0] - size[0]) / 2), round((scaled[1] - size[1]) / 2)
-    return images[..., top : top + size[0], left : left + size[1]]

@@ -33,18 +33,16 @@ from vlnhijack.attack.projected_adam import ProjectedAdam
 from vlnhijack.evaluation.evaluate import evaluate_instance
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.rungs import attack_renderer, unbiased_renderer
 from vlnhijack.experiments.views import house_cameras
 from vlnhijack.frames import Camera
 from vlnhijack.navigation.views import VIEWS
-from vlnhijack.rendering.frozen_renderer import FrozenRenderer
-from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
+from vlnhijack.rendering.fixed_illumination import FixedIlluminationRenderer
 from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.exr import write_exr
 from vlnhijack.scenes.house_files import save_house
 from vlnhijack.scenes.uv_atlas import used_texels
 from vlnhijack.threat import AttackInstance, quantise
-
-RENDERERS = {"frozen": FrozenRenderer, "mitsuba": MitsubaRenderer}
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,17 +124,12 @@ def object_views(
 def attacked_views(
     context: Context, instance: AttackInstance, viewpoints: list[str] | None, stream: str
 ) -> AttackedViews:
-    """The object's views, rendered at the samples of the named stream."""
+    """The object's views at the samples of the named stream; without bias but for "attack"."""
     house, settings = context.houses[instance.scan], context.config.rendering
     rows, views, cameras = object_views(context, instance, viewpoints)
-    make = RENDERERS[settings.rung] if stream == "attack" else FrozenRenderer
-    renderer: Renderer = make(
-        house,
-        instance.object_id,
-        cameras,
-        spp=settings.attack_spp,
-        seed=context.seed("views", stream, instance.id),
-    )
+    make = attack_renderer if stream == "attack" else unbiased_renderer
+    seed = context.seed("views", stream, instance.id)
+    renderer = make(settings, house, instance.object_id, cameras, seed)
     clean = context.place(clean_features(context, instance.scan), instance.scan)
     return AttackedViews(renderer, context.agent.encoder, clean, rows, views)
 
@@ -171,6 +164,8 @@ def _checkpointed(
     validation = attacked_views(context, instance, None, "validation")
     held_out = attack_objective(context.agent, context.table, instance, instance.validation)
     seed = context.seed("attack", instance.id)
+    refresh_every = context.config.rendering.refresh_every
+    _renew_light(views.renderer, texture, refresh_every, first)
     for row in optimise(texture, views, objective, schedule, seed, first):
         append_row(files.log, row._asdict())
         context.progress.update(
@@ -179,7 +174,15 @@ def _checkpointed(
         if row.iteration % schedule.checkpoint_every == 0 or row.iteration == schedule.iterations:
             found = _validate(context, instance, validation, held_out, texture, row.iteration)
             _save_checkpoint(files, texture, found, seed, time.perf_counter() - started)
+        _renew_light(views.renderer, texture, refresh_every, row.iteration)
         yield row
+
+
+def _renew_light(renderer: Renderer, texture: ProjectedAdam, every: int, iteration: int) -> None:
+    """After each `every` iterations, the light that a fixed-illumination rung holds still."""
+    is_due = every > 0 and iteration > 0 and iteration % every == 0
+    if is_due and isinstance(renderer, FixedIlluminationRenderer):
+        renderer.refresh(texture.value)
 
 
 @torch.no_grad()

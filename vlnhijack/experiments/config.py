@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 from vlnhijack.experiments.yaml_config import Settings
 
@@ -52,11 +52,18 @@ class InstanceRules(Settings):
 
 
 class RenderSettings(Settings):
-    """Renderer of the attack, and samples per pixel of the attack, validation and evaluation."""
+    """Renderer of the attack, and samples per pixel of the attack, validation and evaluation.
 
-    rung: Literal["frozen", "mitsuba"] = "frozen"
+    refresh_every is the number of iterations after which `fixed-illumination` renews its light; 0
+    keeps that of the original texture. max_memory, in megabytes, bounds what building an operator
+    takes besides the operator.
+    """
+
+    rung: Literal["frozen", "fixed-illumination", "prb"] = "frozen"
     attack_spp: PositiveInt = 16
     evaluation_spp: PositiveInt = 16
+    refresh_every: NonNegativeInt = 0
+    max_memory: PositiveFloat = 512
 
 
 class AttackSettings(Settings):
@@ -83,3 +90,16 @@ class ExperimentConfig(Settings):
     rules: InstanceRules = InstanceRules()
     rendering: RenderSettings = RenderSettings()
     attack: AttackSettings = AttackSettings()
+
+    @model_validator(mode="after")
+    def _refreshes_at_checkpoints(self) -> "ExperimentConfig":
+        """A resumed attack has the light of the whole one only if checkpoints are refreshes."""
+        every, checkpoint = self.rendering.refresh_every, self.attack.checkpoint_every
+        if every and self.rendering.rung != "fixed-illumination":
+            raise ValueError("rendering.refresh_every needs rendering.rung: fixed-illumination")
+        if every and checkpoint % every:
+            raise ValueError(
+                f"attack.checkpoint_every ({checkpoint}) must be a multiple of "
+                f"rendering.refresh_every ({every})"
+            )
+        return self

@@ -76,4 +76,6 @@ def _deepest_error(file: Path, error: ValidationError) -> InputError:
     if found["type"] == "missing":
         expected, received = "a value", "nothing"
     field = ".".join(map(str, found["loc"]))
+    if found["type"] == "value_error":
+        return InputError(str(found["ctx"]["error"]), file=file, field=field or None)
     return InputError(file=file, field=field, expected=expected, received=received)

@@ -24,8 +24,8 @@ def object_coverage(
     width, height = image_size(cameras)
 
     def share(built: MitsubaScene, sensor: Any, run_seed: int) -> NDArray[Any]:
-        ray, _ = camera_rays(sensor, run_seed, spp)
-        index = _object_index(house, built, ray).reshape(-1, width * height * spp)
+        rays = camera_rays(sensor, run_seed, spp)
+        index = _object_index(house, built, rays.ray).reshape(-1, width * height * spp)
         views = len(index)
         bins = index + 1 + np.arange(views)[:, None] * (count + 1)
         hits = np.bincount(bins.ravel(), minlength=views * (count + 1))

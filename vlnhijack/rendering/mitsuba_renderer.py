@@ -1,26 +1,30 @@
 """Mitsuba's own differentiable renderer behind the `Renderer` protocol."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from vlnhijack.frames import Camera
+from vlnhijack.rendering.display_transform import decode, encode
+from vlnhijack.rendering.filters import Filters
 from vlnhijack.rendering.mitsuba_scene import build_scene, texture_key
 from vlnhijack.rendering.observe import LIT_DEPTH
 from vlnhijack.rendering.renderer import require_texture
-from vlnhijack.rendering.samples import image_size, runs, views_sensor
-from vlnhijack.rendering.variant import activate
+from vlnhijack.rendering.samples import border_of, image_size, runs, views_sensor
+from vlnhijack.rendering.variant import activate, torch_device
 from vlnhijack.scenes.house import House
 
 
 class MitsubaRenderer:
-    """Path replay backpropagation (`prb`) through `dr.wrap`: torch in, torch out.
+    """A differentiable integrator of Mitsuba through `dr.wrap`: torch in, torch out.
 
-    max_depth None means emission alone for baked houses and LIT_DEPTH for lit ones. Images use the
-    camera rays of `render_views` at `seed`; `seed` may be set between calls. Gradients use other
-    rays than images, which keeps them unbiased, namely those of `gradient_seed` if it is set.
+    integrator is a Mitsuba plugin's dictionary; None means `prb` (path replay backpropagation) of
+    max_depth, by default 1 (emission alone) for baked houses and LIT_DEPTH for lit ones. Images use
+    the camera rays of `render_views` at `seed`; `seed` may be set between calls. Gradients use
+    other rays than images, which keeps them unbiased, namely those of `gradient_seed` if it is set.
+    Scene, sensors and films are built once.
     """
 
     def __init__(
@@ -31,7 +35,9 @@ class MitsubaRenderer:
         spp: int = 16,
         seed: int = 0,
         *,
+        integrator: Mapping[str, Any] | None = None,
         max_depth: int | None = None,
+        filters: Filters = Filters(),
     ) -> None:
         mi = activate()
         self.cameras = tuple(cameras)
@@ -41,9 +47,10 @@ class MitsubaRenderer:
         self.texture_shape = (rows, columns, 3)
         self._exposure = house.exposure if house.kind == "lit" else None
         depth = max_depth or (1 if house.kind == "baked" else LIT_DEPTH)
-        self._integrator = mi.load_dict({"type": "prb", "max_depth": depth})
-        self._scene = build_scene(house).scene
-        self._sensors = [views_sensor(run.cameras, spp) for run in runs(cameras, spp)]
+        self._integrator = mi.load_dict({**(integrator or {"type": "prb", "max_depth": depth})})
+        self._scene = build_scene(house, filters).scene
+        self._border = border_of(filters.film)
+        self._sensors = [views_sensor(run.cameras, spp, filters.film) for run in runs(cameras, spp)]
         key = texture_key(house, object_id)
         self._params = mi.traverse(self._scene)
         self._params.keep([key])
@@ -52,17 +59,24 @@ class MitsubaRenderer:
     def __call__(self, texture: Tensor) -> Tensor:
         """Images (V,3,h,w) of a texture (H,W,3); InputError for another shape."""
         require_texture(texture, self.texture_shape)
-        values = texture if self._exposure is None else _decode(texture)
+        values = texture.to(torch_device())
+        values = values if self._exposure is None else decode(values)
         films = [
             self._render(values, sensor, run.seed, self._gradient_seed(run.first))
             for sensor, run in zip(
                 self._sensors, runs(self.cameras, self.spp, self.seed), strict=True
             )
         ]
+        images = self._cropped(torch.cat(films))
+        shown = images if self._exposure is None else encode(self._exposure * images)
+        return shown.permute(0, 3, 1, 2).to(texture.device)
+
+    def _cropped(self, film: Tensor) -> Tensor:
+        """Views (V,h,w,3) of stacked films, without the films' borders and the runs' filling."""
         width, height = image_size(self.cameras)
-        images = torch.cat(films).view(-1, height, width, 3)[: len(self.cameras)]
-        shown = images if self._exposure is None else _encode(self._exposure * images)
-        return shown.permute(0, 3, 1, 2)
+        border = self._border
+        views = film.view(-1, height + 2 * border, width + 2 * border, 3)[: len(self.cameras)]
+        return views[:, border : border + height, border : border + width]
 
     def _gradient_seed(self, first: int) -> int:
         """0 lets Mitsuba derive one from the seed of the images."""
@@ -88,16 +102,3 @@ def _torch_render(params: Any, key: str, integrator: Any, scene: Any, spp: int) 
         )
 
     return render
-
-
-def _decode(display: Tensor) -> Tensor:
-    """Linear values of display values (see vlnhijack.display), differentiable."""
-    high = ((display.clamp_min(0.04045) + 0.055) / 1.055) ** 2.4
-    return torch.where(display <= 0.04045, display / 12.92, high)
-
-
-def _encode(linear: Tensor) -> Tensor:
-    """Display values of linear radiance, clipped to [0,1] (see vlnhijack.display)."""
-    x = linear.clamp(0, 1)
-    high = 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055
-    return torch.where(x <= 0.0031308, 12.92 * x, high)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlnhijack import display
+from vlnhijack.rendering.filters import Filters
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House, Light
 from vlnhijack.scenes.surface import Surface
@@ -33,7 +34,7 @@ class MitsubaScene:
         return dr.gather(mi.Int32, self.surface_of_shape, pointer)
 
 
-def build_scene(house: House) -> MitsubaScene:
+def build_scene(house: House, filters: Filters = Filters()) -> MitsubaScene:
     """The scene of a house: baked surfaces glow as they look, lit ones are diffuse.
 
     Baked textures are `raw` radiance. Lit textures are handed over as linear albedo, because
@@ -42,7 +43,7 @@ def build_scene(house: House) -> MitsubaScene:
     mi = activate()
     content: dict[str, Any] = {"type": "scene"}
     for index, surface in enumerate(house.surfaces):
-        content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind)
+        content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind, filters)
     for index, light in enumerate(house.lights if house.kind == "lit" else ()):
         content[f"light_{index}"] = _light(light)
     scene = mi.load_dict(content)
@@ -50,16 +51,29 @@ def build_scene(house: House) -> MitsubaScene:
 
 
 @lru_cache(maxsize=2)
-def shared_scene(house: House) -> MitsubaScene:
+def shared_scene(house: House, filters: Filters = Filters()) -> MitsubaScene:
     """The scene of a house for readers, who leave it as it is; the last two are kept."""
-    return build_scene(house)
+    return build_scene(house, filters)
+
+
+def surface_number(house: House, object_id: str) -> int:
+    """Index into `house.surfaces` of an object's surface; InputError where there is none."""
+    return house.surfaces.index(house.surface(object_id))
 
 
 def texture_key(house: House, object_id: str) -> str:
     """The scene parameter that holds an object's texture."""
-    index = next(i for i, s in enumerate(house.surfaces) if s.object_id == object_id)
+    index = surface_number(house, object_id)
     plugin = "emitter.radiance" if house.kind == "baked" else "bsdf.reflectance"
     return f"surface_{index}.{plugin}.data"
+
+
+def set_texture(built: MitsubaScene, house: House, object_id: str, values: NDArray) -> None:
+    """Give an object another texture (H,W,3) of the same shape: radiance, or linear albedo."""
+    mi = activate()
+    params = mi.traverse(built.scene)
+    params[texture_key(house, object_id)] = mi.TensorXf(np.ascontiguousarray(values, np.float32))
+    params.update()
 
 
 def set_textures(built: MitsubaScene, textures: Sequence[NDArray[np.float32]]) -> None:
@@ -71,28 +85,29 @@ def set_textures(built: MitsubaScene, textures: Sequence[NDArray[np.float32]]) -
     params.update()
 
 
-def bitmap(texture: NDArray[np.float32]) -> dict[str, Any]:
-    """A differentiable float texture, bilinear and clamped at its border."""
+def bitmap(texture: NDArray[np.float32], filters: Filters) -> dict[str, Any]:
+    """A differentiable float texture."""
     return {
         "type": "bitmap",
         "data": activate().TensorXf(np.ascontiguousarray(texture, np.float32)),
         "format": "variant",
         "raw": True,
-        "filter_type": "bilinear",
-        "wrap_mode": "clamp",
+        "filter_type": filters.lookup,
+        "wrap_mode": filters.wrap,
     }
 
 
-def _mesh(name: str, surface: Surface, kind: str) -> Any:
+def _mesh(name: str, surface: Surface, kind: str, filters: Filters) -> Any:
     mi = activate()
     props = mi.Properties()
     if kind == "baked":
-        props["emitter"] = mi.load_dict({"type": "area", "radiance": bitmap(surface.texture)})
+        glow = bitmap(surface.texture, filters)
+        props["emitter"] = mi.load_dict({"type": "area", "radiance": glow})
         props["bsdf"] = mi.load_dict(
             {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0}}
         )
     else:
-        albedo = bitmap(display.decode(surface.texture))
+        albedo = bitmap(display.decode(surface.texture), filters)
         props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": albedo})
     mesh = mi.Mesh(
         name, len(surface.vertices), len(surface.faces), has_vertex_texcoords=True, props=props

@@ -44,7 +44,7 @@ def _radiance(
 ) -> NDArray[np.float32]:
     """Mean radiance (pixels, 3) in film order."""
     mi = activate()
-    ray, sampler = camera_rays(sensor, seed, spp)
+    ray, _, sampler = camera_rays(sensor, seed, spp)
     if kind == "baked":
         interaction = built.scene.ray_intersect(ray, mi.RayFlags.All, True)
         radiance = interaction.emitter(built.scene).eval(interaction)
@@ -64,5 +64,5 @@ def pixel_means(channels: Iterable[Any], spp: int) -> NDArray[np.float32]:
 
 
 @cache
-def path_tracer() -> Any:
-    return activate().load_dict({"type": "path", "max_depth": LIT_DEPTH, "rr_depth": 3})
+def path_tracer(max_depth: int = LIT_DEPTH) -> Any:
+    return activate().load_dict({"type": "path", "max_depth": max_depth, "rr_depth": 3})

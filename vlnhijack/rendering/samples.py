@@ -3,17 +3,21 @@
 Many cameras of one image size are one Mitsuba sensor whose film stacks the views from top to
 bottom, so that all of them render in one wavefront. `camera_rays` draws with the `sample_rays` of
 Mitsuba's own integrators: `mi.render` with the same sensor, seed and spp uses the same rays.
+
+A film filter wider than a pixel gets a border of pixels around each view, which `cropped` cuts off.
+So views do not leak into each other, and a pixel at the edge has samples on all sides.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vlnhijack.errors import InputError
 from vlnhijack.frames import Camera, camera_to_world
+from vlnhijack.rendering.filters import Film, Filters, film_filter
 from vlnhijack.rendering.variant import activate
 
 SAMPLER = "stratified"
@@ -31,41 +35,58 @@ def image_size(cameras: Sequence[Camera]) -> tuple[int, int]:
     return sizes.pop()
 
 
-def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
-    """A Mitsuba sensor of V cameras: film (V·height, width), box filter, float32.
+def border_of(film: Film) -> int:
+    """Pixels that the film needs on every side of a view."""
+    return int(film_filter(Filters(film)).border_size())
+
+
+def views_sensor(cameras: Sequence[Camera], spp: int, film: Film = "box") -> Any:
+    """A Mitsuba sensor of V cameras: float32 film (V·(height + 2·border), width + 2·border).
 
     `sensor.aim(cameras)` points it at as many other cameras of the same size.
     """
     width, height = image_size(cameras)
     mi = activate()
     _register()
-    film = {
+    border = border_of(film)
+    content = {
         "type": "hdrfilm",
-        "width": width,
-        "height": height * len(cameras),
-        "rfilter": {"type": "box"},
+        "width": width + 2 * border,
+        "height": (height + 2 * border) * len(cameras),
+        "rfilter": {"type": film},
         "pixel_format": "rgb",
         "component_format": "float32",
         "sample_border": False,
     }
     sampler = {"type": SAMPLER, "sample_count": spp}
-    sensor = mi.load_dict({"type": "vlnhijack_views", "film": film, "sampler": sampler})
+    sensor = mi.load_dict({"type": "vlnhijack_views", "film": content, "sampler": sampler})
     sensor.aim(cameras)
     return sensor
 
 
-def camera_rays(sensor: Any, seed: int, spp: int) -> tuple[Any, Any]:
-    """Rays in film order, `spp` after another for each pixel, and the sampler that drew them.
+class CameraRays(NamedTuple):
+    """Rays in film order, `spp` after another for each pixel.
 
-    They are those of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator). Raises
-    InputError where spp is no square number, as the stratified sampler needs.
+    position: where they meet the film, in pixels (box filter: the pixel's corner); sampler: the one
+    that drew them.
+    """
+
+    ray: Any
+    position: Any
+    sampler: Any
+
+
+def camera_rays(sensor: Any, seed: int, spp: int) -> CameraRays:
+    """The rays of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator).
+
+    Raises InputError where spp is no square number, as the stratified sampler needs.
     """
     integrator = _ray_source()
     sampler, drawn = integrator.prepare(sensor, seed, spp)
     if drawn != spp:
         raise InputError(field="spp", expected="a square number", received=spp)
-    ray, _, _ = integrator.sample_rays(sensor=sensor, scene=None, sampler=sampler)
-    return ray, sampler
+    ray, _, position = integrator.sample_rays(sensor=sensor, scene=None, sampler=sampler)
+    return CameraRays(ray, position, sampler)
 
 
 def centre_rays(sensor: Any) -> Any:
@@ -124,12 +145,13 @@ def _register() -> None:
 
         def aim(self, cameras: Sequence[Camera]) -> None:
             poses = np.stack([camera_to_world(camera)[:3].T for camera in cameras])
-            half_height = np.tan([camera.vertical_fov / 2 for camera in cameras])
-            aspect = np.array([camera.width / camera.height for camera in cameras])
+            half_pixel = np.array([np.tan(c.vertical_fov / 2) / c.height for c in cameras])
+            width, height = self.film().size()
+            half_height, half_width = half_pixel * height / len(cameras), half_pixel * width
             self.count = dr.opaque(mi.UInt32, len(cameras))
             self.poses = mi.Float(poses.ravel().astype(np.float32))
             self.half_height = mi.Float(half_height.astype(np.float32))
-            self.half_width = mi.Float((half_height * aspect).astype(np.float32))
+            self.half_width = mi.Float(half_width.astype(np.float32))
 
         def sample_ray_differential(
             self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True

@@ -1,34 +1,40 @@
-"""Light transport of a baked house as a sparse matrix: image = b + A·t.
+"""Light transport from one texture to pixels as a sparse matrix: image = b + A·t (design, 5).
 
-A maps the texels t of one texture to pixels. It is a pure function of where the camera rays hit the
-object: each hit adds its bilinear weights over the number of samples, as Mitsuba's box filter and
-bitmap texture (bilinear, clamped) do. Design section 5.
+A is fixed by geometry, camera rays and filters (see `entries`), and in a lit house by the light.
 """
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
-from scipy import sparse
 from torch import Tensor
 from torch.autograd.function import once_differentiable
+
+from vlnhijack.rendering.entries import Entries, background, entries
+from vlnhijack.rendering.filters import Filters
+from vlnhijack.rendering.sorting import stable_order
+from vlnhijack.rendering.trace import Samples
 
 
 @dataclass(frozen=True, eq=False)
 class Transport:
-    """A in both directions, over the C texels that weigh on any of P pixels.
+    """A in both directions, between T = H·W texels and P pixels.
 
-    forward (P,C) and adjoint (C,P) are CSR tensors; texels (C,) int64 index the texture (H·W).
+    forward (P,T) and adjoint (T,P) are CSR tensors with int32 indices. Where light is coloured they
+    are (3P,3T) and (3T,3P), channel after channel of a pixel and of a texel, and channels is 3.
     """
 
     forward: Tensor
     adjoint: Tensor
-    texels: Tensor
     texture_shape: tuple[int, int, int]
+    channels: int = 1
+
+    @property
+    def texels(self) -> Tensor:
+        """The texels (C,) that weigh on any pixel, ascending."""
+        return torch.unique(self.forward.col_indices() // self.channels)
 
     def __call__(self, texture: Tensor) -> Tensor:
         """Radiance (P,3) of the object with a texture (H,W,3); differentiable once."""
@@ -37,90 +43,80 @@ class Transport:
 
     def double(self) -> "Transport":
         """The same matrix with float64 entries, for finite differences."""
-        return Transport(
-            self.forward.double(), self.adjoint.double(), self.texels, self.texture_shape
-        )
+        return replace(self, forward=self.forward.double(), adjoint=self.adjoint.double())
+
+    def apply(self, matrix: Tensor, colours: Tensor) -> Tensor:
+        """forward or adjoint times colours (…,3), as (K,3)."""
+        return (matrix @ colours.reshape(-1, 3 // self.channels)).view(-1, 3)
 
 
 class _Apply(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, texture: Tensor, transport: Transport) -> Tensor:
         ctx.transport = transport
-        return transport.forward @ texture.reshape(-1, 3)[transport.texels]
+        return transport.apply(transport.forward, texture)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, image_gradient: Tensor) -> tuple[Tensor, None]:
         transport = ctx.transport
-        height, width, _ = transport.texture_shape
-        gradient = image_gradient.new_zeros(height * width, 3)
-        gradient[transport.texels] = transport.adjoint @ image_gradient.contiguous()
+        gradient = transport.apply(transport.adjoint, image_gradient)
         return gradient.view(transport.texture_shape), None
 
 
-def transport_rows(
-    pixel: NDArray[np.integer],
-    uv: NDArray[np.float32],
-    weight: float,
-    pixels: int,
+def build(
+    runs: Iterable[Samples],
     texture_shape: tuple[int, int, int],
-) -> sparse.csr_array:
-    """Rows (P,H·W) of A of K hits: pixel (K,) they belong to and uv (K,2); duplicates summed.
-
-    weight is that of one camera ray in its pixel.
-    """
-    height, width, _ = texture_shape
-    texel, share = bilinear(uv, height, width)
-    entries = (
-        (weight * share).ravel().astype(np.float64),
-        (np.repeat(pixel.astype(np.int32), 4), texel.ravel().astype(np.int32)),
-    )
-    rows = sparse.coo_array(entries, shape=(pixels, height * width)).tocsr()
-    rows.eliminate_zeros()
-    return rows
+    filters: Filters,
+    max_memory: float,
+) -> tuple[Transport, Tensor]:
+    """A and b (P,3) of all runs; max_memory bounds, in megabytes, what the entries' tiles take."""
+    rest: list[Tensor] = []
+    tiles: list[Entries] = []
+    for samples in runs:
+        rest.append(background(samples, filters))
+        tiles += entries(samples, texture_shape, filters, max_memory)
+    everything = torch.cat(rest)
+    return assemble(tiles, len(everything), texture_shape), everything
 
 
-def bilinear(
-    uv: NDArray[np.float32], height: int, width: int
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Texels (K,4), as indices into (H·W), and weights (K,4) of a lookup at uv (K,2).
-
-    The position is u·W − ½, neighbours are clamped to the texture (mi.Bitmap, wrap mode clamp).
-    """
-    position = uv * np.array([width, height], np.float32) - np.float32(0.5)
-    low = np.floor(position)
-    upper = position - low
-    corner = low.astype(np.int64)
-    columns = np.clip(np.stack([corner[:, 0], corner[:, 0] + 1], 1), 0, width - 1)
-    rows = np.clip(np.stack([corner[:, 1], corner[:, 1] + 1], 1), 0, height - 1)
-    share = np.stack([1 - upper, upper], 1)
-    texel = rows[:, :, None] * width + columns[:, None, :]
-    weight = share[:, :, None, 1] * share[:, None, :, 0]
-    return texel.reshape(-1, 4), weight.reshape(-1, 4)
+def assemble(
+    tiles: Iterable[Entries], pixels: int, texture_shape: tuple[int, int, int]
+) -> Transport:
+    """The operator onto so many pixels with the entries of all tiles, which come in pixel order."""
+    pixel, texel, values = (torch.cat(parts) for parts in zip(*tiles, strict=True))
+    channels = values.shape[1]
+    shape = (channels * pixels, channels * texture_shape[0] * texture_shape[1])
+    rows, columns = (_by_channel(index, channels) for index in (pixel, texel))
+    order = stable_order(rows) if channels > 1 else slice(None)
+    forward = csr_of_entries(rows[order], columns[order], values.ravel()[order], shape)
+    return Transport(forward, transposed(forward), texture_shape, channels)
 
 
-def assemble(parts: Sequence[sparse.csr_array], texture_shape: tuple[int, int, int]) -> Transport:
-    """The operator whose rows are those of the parts (P_i,H·W), one below the other."""
-    matrix = sparse.vstack(parts, format="csr")
-    texels, columns = np.unique(matrix.indices, return_inverse=True)
-    shape = (matrix.shape[0], len(texels))
-    matrix = sparse.csr_array((matrix.data, columns.astype(np.int32), matrix.indptr), shape=shape)
-    matrix.sort_indices()
-    return Transport(
-        _csr(matrix),
-        _csr(matrix.T.tocsr()),
-        torch.from_numpy(texels.astype(np.int64)),
-        texture_shape,
-    )
+def transposed(matrix: Tensor) -> Tensor:
+    """The transpose of a CSR matrix as a CSR matrix."""
+    rows = torch.arange(matrix.shape[0], device=matrix.device, dtype=torch.int32)
+    rows = rows.repeat_interleave(matrix.crow_indices().diff())
+    order = stable_order(matrix.col_indices())
+    shape = (matrix.shape[1], matrix.shape[0])
+    return csr_of_entries(matrix.col_indices()[order], rows[order], matrix.values()[order], shape)
 
 
-def _csr(matrix: sparse.csr_array) -> Tensor:
+def _by_channel(index: Tensor, channels: int) -> Tensor:
+    """Index (E,) of pixels or texels to the int32 index (E·channels,) of their channels."""
+    channel = torch.arange(channels, device=index.device)
+    return (index[:, None] * channels + channel).int().ravel()
+
+
+def csr_of_entries(rows: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, int]) -> Tensor:
+    """A CSR matrix of entries sorted by row, then column."""
+    starts = torch.zeros(shape[0] + 1, dtype=torch.int32, device=rows.device)
+    starts[1:] = torch.cumsum(torch.bincount(rows, minlength=shape[0]), 0)
+    return csr(starts, columns, values, shape)
+
+
+def csr(starts: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, int]) -> Tensor:
+    """A CSR matrix of its three arrays."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Sparse CSR tensor support is in beta")
-        return torch.sparse_csr_tensor(
-            torch.from_numpy(matrix.indptr.astype(np.int32)),
-            torch.from_numpy(matrix.indices.astype(np.int32)),
-            torch.from_numpy(matrix.data.astype(np.float32)),
-            size=matrix.shape,
-            check_invariants=True,
-        )
+        return torch.sparse_csr_tensor(starts, columns, values, size=shape, check_invariants=True)

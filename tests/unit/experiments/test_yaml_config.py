@@ -63,7 +63,7 @@ def test_a_saved_config_is_the_same(tmp_path: Path, text: str) -> None:
         ("rendering: 3", "a.yaml: rendering: expected a valid dictionary"),
         ("rules: {min_paths: 1}", "a.yaml: rules.min_paths: expected greater than or equal to 2"),
         ("rules: {validation: 0}", "a.yaml: rules.validation: expected greater than 0, received 0"),
-        ("rendering: {rung: maya}", "a.yaml: rendering.rung: expected 'frozen' or 'mitsuba', rec"),
+        ("rendering: {rung: maya}", "a.yaml: rendering.rung: expected 'frozen', 'fixed-"),
     ],
 )
 def test_bad_values_are_named(tmp_path: Path, line: str, expected: str) -> None:
@@ -104,6 +104,22 @@ def test_errors_in_drawn_instances_name_their_key(
     assert field in message(write(tmp_path, DRAWN.replace(old, new)))
 
 
+@pytest.mark.parametrize(
+    ("rendering", "expected"),
+    [
+        ("{refresh_every: 5}", "a.yaml: rendering.refresh_every needs rendering.rung: fixed-"),
+        (
+            "{rung: fixed-illumination, refresh_every: 7}",
+            "a.yaml: attack.checkpoint_every (30) must be a multiple of rendering.refresh_every (7",
+        ),
+    ],
+)
+def test_light_is_renewed_by_the_rung_that_has_it_and_at_checkpoints(
+    tmp_path: Path, rendering: str, expected: str
+) -> None:
+    assert message(write(tmp_path, f"{DRAWN}\nrendering: {rendering}")).startswith(expected)
+
+
 def test_errors_in_picked_instances_name_their_key(tmp_path: Path) -> None:
     text = PICKED.replace("object: sofa_0", "objekt: sofa_0")
     assert "0.object: expected a value, received 'nothing'" in message(write(tmp_path, text))
@@ -111,12 +127,12 @@ def test_errors_in_picked_instances_name_their_key(tmp_path: Path) -> None:
 
 def test_overrides_replace_single_values(tmp_path: Path) -> None:
     file = write(tmp_path, DRAWN)
-    overrides = ["attack.batch=4", "instances.count=7", "rendering.rung=mitsuba"]
+    overrides = ["attack.batch=4", "instances.count=7", "rendering.rung=prb"]
     config = load_config(file, ExperimentConfig, overrides)
     assert (config.attack.iterations, config.attack.batch) == (20, 4)
     assert isinstance(config.instances, DrawnInstances)
     assert config.instances.count == 7
-    assert config.rendering.rung == "mitsuba"
+    assert config.rendering.rung == "prb"
     assert "seed" in message(file, "seed=x")
 
 

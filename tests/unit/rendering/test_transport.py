@@ -1,77 +1,174 @@
-"""The sparse operator as a pure function of hits; Mitsuba is not needed."""
+"""The sparse operator of given hits, against its float64 twin (tests/transport_twin.py)."""
+
+from itertools import product
 
 import numpy as np
+import pytest
 import torch
-from scipy.ndimage import map_coordinates
 
-from vlnhijack.rendering.transport import Transport, assemble, bilinear, transport_rows
+from tests.transport_twin import Hit, dense_operator
+from vlnhijack.errors import InputError
+from vlnhijack.rendering.filters import Filters, film_filter
+from vlnhijack.rendering.samples import border_of
+from vlnhijack.rendering.trace import Met, Samples
+from vlnhijack.rendering.transport import Transport, build
+from vlnhijack.rendering.variant import activate
 
-SHAPE = (6, 8, 3)
-PIXELS = 20
+SIZE, VIEWS, SPP = (5, 4), 2, 4
+SHAPE = (3, 6, 3)
+CHOICES = [
+    Filters(film, lookup, wrap)
+    for film, lookup, wrap in product(
+        ("box", "gaussian"), ("bilinear", "nearest"), ("clamp", "repeat", "mirror")
+    )
+    if film == "box" or wrap == "clamp"
+]
 
 
-def _operator(seed: int = 0, hits: int = 300) -> Transport:
-    random = np.random.default_rng(seed)
-    pixel = random.integers(0, PIXELS - 3, hits)
-    uv = random.random((hits, 2), np.float32)
-    return assemble([transport_rows(pixel, uv, 1 / 16, PIXELS, SHAPE)], SHAPE)
-
-
-def test_bilinear_is_a_clamped_lookup_at_half_texels() -> None:
+def _hits(filters: Filters) -> list[Hit]:
+    """Rays in film order; uv beyond the texture, two thirds of the rays hit, the last view less."""
     random = np.random.default_rng(0)
-    texture = random.random((6, 8))
-    uv = random.uniform(-0.1, 1.1, (500, 2)).astype(np.float32)
-    texel, weight = bilinear(uv, 6, 8)
-    where = np.stack([uv[:, 1] * 6 - 0.5, uv[:, 0] * 8 - 0.5])
-    expected = map_coordinates(texture, where, order=1, mode="nearest")
-    np.testing.assert_allclose((texture.ravel()[texel] * weight).sum(1), expected, atol=1e-6)
-
-
-def test_hits_of_one_pixel_and_texel_are_merged() -> None:
-    pixel, uv = np.array([2, 2, 5]), np.full((3, 2), 0.5, np.float32)
-    rows = transport_rows(pixel, uv, 0.25, PIXELS, SHAPE)
-    assert rows.nnz == 8
-    np.testing.assert_allclose(rows.sum(1)[[2, 5]], [0.5, 0.25])
-
-
-def test_parts_lie_below_one_another() -> None:
-    random = np.random.default_rng(1)
-    pixel, uv = np.sort(random.integers(0, PIXELS, 100)), random.random((100, 2), np.float32)
-    split = int(np.searchsorted(pixel, 10))
-    parts = [
-        transport_rows(pixel[:split], uv[:split], 1.0, 10, SHAPE),
-        transport_rows(pixel[split:] - 10, uv[split:], 1.0, 10, SHAPE),
+    border = border_of(filters.film)
+    return [
+        Hit(
+            view,
+            x + random.integers(1024) / 1024,
+            y + random.integers(1024) / 1024,
+            tuple(random.uniform(-1.2, 2.2, 2).astype(np.float32).tolist())
+            if random.random() < (0.7, 0.1)[view]
+            else None,
+        )
+        for view in range(VIEWS)
+        for y in range(-border, SIZE[1] + border)
+        for x in range(-border, SIZE[0] + border)
+        for _ in range(SPP)
     ]
-    whole = assemble([transport_rows(pixel, uv, 1.0, PIXELS, SHAPE)], SHAPE)
-    texture = torch.rand(SHAPE)
-    torch.testing.assert_close(assemble(parts, SHAPE)(texture), whole(texture))
 
 
-def test_only_texels_that_are_seen_are_columns() -> None:
-    uv = np.full((4, 2), 0.5, np.float32)
-    operator = assemble([transport_rows(np.arange(4), uv, 1.0, PIXELS, SHAPE)], SHAPE)
-    assert operator.texels.tolist() == [2 * 8 + 3, 2 * 8 + 4, 3 * 8 + 3, 3 * 8 + 4]
-    assert operator.forward.shape == (PIXELS, 4)
+def _samples(hits: list[Hit], filters: Filters, views: int = VIEWS) -> Samples:
+    mi = activate()
+    border = border_of(filters.film)
+    full = SIZE[1] + 2 * border
+    position = np.float32([[hit.x + border, hit.view * full + hit.y + border] for hit in hits])
+    uv = np.float32([hit.uv or (0, 0) for hit in hits])
+    light = mi.Float(np.float32([hit.light if hit.uv else 0 for hit in hits]))
+    rest = mi.Color3f(np.float32([[0 if hit.uv else 0.5] * 3 for hit in hits]).T)
+    met = Met(mi.Point2f(uv.T), [light], rest)
+    return Samples(0, views, SIZE, SPP, mi.Point2f(position.T), met)
 
 
-def test_adjoint_identity() -> None:
-    operator = _operator().double()
+def _build(filters: Filters, max_memory: float = 100) -> tuple[Transport, torch.Tensor]:
+    return build([_samples(_hits(filters), filters)], SHAPE, filters, max_memory)
+
+
+def _twin(filters: Filters) -> np.ndarray:
+    film = None
+    if filters.film == "gaussian":
+        mi, kernel = activate(), film_filter(filters)
+
+        def film(distance: float) -> float:
+            return float(np.array(kernel.eval(mi.Float(distance)))[0])
+
+    return dense_operator(
+        _hits(filters), VIEWS, SIZE, SHAPE[:2], filters.lookup, filters.wrap, film
+    )
+
+
+def _dense(transport: Transport) -> np.ndarray:
+    return transport.forward.to_dense().numpy()
+
+
+@pytest.mark.parametrize("filters", CHOICES, ids=str)
+def test_the_operator_and_its_gradient_are_the_twins(filters: Filters) -> None:
+    transport, _ = _build(filters)
+    twin = _twin(filters)
+    np.testing.assert_allclose(_dense(transport), twin, atol=1e-6)
+    texture = torch.rand(SHAPE, generator=torch.Generator().manual_seed(1)).requires_grad_()
+    weights = torch.rand(len(twin), 3, generator=torch.Generator().manual_seed(2))
+    (gradient,) = torch.autograd.grad(transport(texture), texture, weights)
+    expected = (twin.T @ weights.double().numpy()).reshape(SHAPE)
+    assert np.abs(gradient.numpy() - expected).max() <= 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("film", ["box", "gaussian"])
+def test_rows_and_background_share_the_pixel(film: str) -> None:
+    """Half the rays' weight that misses the object is background of radiance ½."""
+    transport, background = _build(Filters(film))  # type: ignore[arg-type]
+    covered = transport(torch.ones(SHAPE))
+    torch.testing.assert_close(covered, 1 - 2 * background, atol=1e-6, rtol=0)
+    assert 0 < covered.mean() < 1
+
+
+@pytest.mark.parametrize("film", ["box", "gaussian"])
+def test_tiles_change_no_bit(film: str) -> None:
+    filters = Filters(film)  # type: ignore[arg-type]
+    whole, tiled = _build(filters)[0], _build(filters, 1e-9)[0]
+    for a, b in ((whole.forward, tiled.forward), (whole.adjoint, tiled.adjoint)):
+        assert torch.equal(a.crow_indices(), b.crow_indices())
+        assert torch.equal(a.col_indices(), b.col_indices())
+        assert torch.equal(a.values(), b.values())
+
+
+def test_indices_are_int32_and_no_pair_occurs_twice() -> None:
+    forward = _build(Filters())[0].forward
+    assert forward.crow_indices().dtype == forward.col_indices().dtype == torch.int32
+    place = forward.to_sparse_coo().indices()
+    assert len(torch.unique(place, dim=1).T) == forward.values().numel() > 50
+
+
+def test_only_the_views_that_count_have_rows() -> None:
+    """A run is filled up with its last camera."""
+    filters = Filters()
+    transport, background = build([_samples(_hits(filters), filters, 1)], SHAPE, filters, 100)
+    assert transport.forward.shape[0] == len(background) == SIZE[0] * SIZE[1]
+    np.testing.assert_allclose(_dense(transport), _twin(filters)[: len(background)], atol=1e-6)
+
+
+def test_coloured_light_weighs_each_channel() -> None:
+    filters, colours = Filters(), (1.0, 2.0, 0.5)
+    grey = _samples(_hits(filters), filters)
+    coloured = Samples(
+        0,
+        VIEWS,
+        SIZE,
+        SPP,
+        grey.position,
+        grey.met._replace(light=[c * grey.met.light[0] for c in colours]),
+    )
+    texture = torch.rand(SHAPE, generator=torch.Generator().manual_seed(1)).requires_grad_()
+    expected = build([grey], SHAPE, filters, 100)[0](texture) * torch.tensor(colours)
+    transport, _ = build([coloured], SHAPE, filters, 100)
+    assert transport.forward.shape == (3 * len(expected), 3 * SHAPE[0] * SHAPE[1])
+    torch.testing.assert_close(transport(texture), expected)
+    weights = torch.rand(expected.shape, generator=torch.Generator().manual_seed(2))
+    gradients = [
+        torch.autograd.grad(x, texture, weights)[0] for x in (transport(texture), expected)
+    ]
+    torch.testing.assert_close(*gradients)
+
+
+def test_an_object_in_no_view_gives_black_and_no_gradient() -> None:
+    filters = Filters()
+    hits = [hit._replace(uv=None) for hit in _hits(filters)]
+    transport, background = build([_samples(hits, filters)], SHAPE, filters, 100)
+    texture = torch.rand(SHAPE, requires_grad=True)
+    image = transport(texture)
+    assert image.shape == background.shape
+    (gradient,) = torch.autograd.grad(image.sum(), texture)
+    assert not image.any() and not gradient.any()
+    assert transport.texels.numel() == 0
+
+
+def test_adjoint_identity_and_finite_differences() -> None:
+    transport = _build(Filters())[0].double()
     texture = torch.rand(SHAPE, dtype=torch.float64, requires_grad=True)
-    weights = torch.rand(PIXELS, 3, dtype=torch.float64)
-    image = operator(texture)
+    weights = torch.rand(len(transport.forward), 3, dtype=torch.float64)
+    image = transport(texture)
     (gradient,) = torch.autograd.grad(image, texture, weights)
     torch.testing.assert_close((image * weights).sum(), (texture * gradient).sum())
+    assert torch.autograd.gradcheck(transport, texture)
 
 
-def test_float64_finite_differences() -> None:
-    texture = torch.rand(SHAPE, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(_operator().double(), texture)
-
-
-def test_unseen_texels_get_no_gradient() -> None:
-    uv = np.full((4, 2), 0.5, np.float32)
-    operator = assemble([transport_rows(np.arange(4), uv, 1.0, PIXELS, SHAPE)], SHAPE)
-    texture = torch.rand(SHAPE, requires_grad=True)
-    operator(texture).sum().backward()
-    assert texture.grad is not None
-    assert (texture.grad.flatten(0, 1).sum(1) > 0).nonzero().ravel().tolist() == [19, 20, 27, 28]
+def test_an_unknown_filter_is_named() -> None:
+    with pytest.raises(InputError, match="lookup: expected one of .*'bicubic'"):
+        Filters(lookup="bicubic")  # type: ignore[arg-type]
