@@ -11,6 +11,8 @@ from vlnhijack.scenes.house import House, HouseObject
 from vlnhijack.scenes.surface import Surface
 
 USED = 0.8  # of each side of a chart's cell, as packed atlases leave gaps
+# corner and size in uv of each wall's cell: a texel is as large on the floor as on a wall
+CELLS = [(0, 0.5), (0.5, 0.5), (0, 0.75), (0.5, 0.75), (0, 0), (0.5, 0)]
 
 
 def large_room(side: int = 169, size: int = 1024) -> House:
@@ -23,12 +25,14 @@ def large_room(side: int = 169, size: int = 1024) -> House:
         axis, far = divmod(wall, 2)
         points = np.empty((*a.shape, 3))
         points[..., [i for i in range(3) if i != axis]] = np.stack([a, b], -1)
-        points[..., axis] = far + (0.5 - far) * 0.01 * np.sin(40 * a) * np.sin(37 * b)
+        points[..., axis] = far + (0.5 - far) * 0.01 * np.sin(13 * np.pi * a) * np.sin(
+            12 * np.pi * b
+        )
         turned = corners if (axis == 1) == bool(far) else corners[:, ::-1]
         faces.append(turned + wall * a.size)
         vertices.append(((points - (0.5, 0.5, 0)) * ROOM).reshape(-1, 3))
-        cell = np.stack([wall % 3 + USED * a + 0.1, wall // 3 + USED * b + 0.1], -1)
-        uv.append(cell.reshape(-1, 2) / (3, 2))
+        inside = np.stack([a, b], -1).reshape(-1, 2) * USED + (1 - USED) / 2
+        uv.append(CELLS[wall] + inside * (0.5, 0.5 if axis == 2 else 0.25))
     random = seeds.stream(0, "large room")
     smooth = zoom(random.uniform(0.2, 0.8, (64, 64, 3)), (size / 64, size / 64, 1), order=1)
     texture = (smooth + random.uniform(-0.1, 0.1, smooth.shape)).astype(np.float32)
