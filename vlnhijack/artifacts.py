@@ -14,6 +14,16 @@ from vlnhijack.errors import InputError
 
 
 @contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """An OSError of the block that names no file, such as that of a full disk, names `path`."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
+
+
+@contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary path with the same suffix that replaces `path` when the block succeeds."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -23,7 +33,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
+        with _named(path):
+            yield temporary
         temporary.chmod(0o644)
         temporary.replace(path)
     finally:
@@ -36,7 +47,8 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     try:
-        yield temporary
+        with _named(path):
+            yield temporary
         temporary.chmod(0o755)
         if path.exists():
             shutil.rmtree(path)
@@ -70,7 +82,7 @@ def read_json(path: Path) -> Any:
 
 def append_row(path: Path, row: dict[str, Any]) -> None:
     """Add a line to a JSONL file."""
-    with path.open("a") as file:
+    with _named(path), path.open("a") as file:
         file.write(json.dumps(row) + "\n")
 
 
