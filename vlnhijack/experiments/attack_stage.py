@@ -20,9 +20,9 @@ from vlnhijack.artifacts import (
     write_json,
     write_text,
 )
+from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective, attack_objective
 from vlnhijack.attack.optimise import (
-    AttackedViews,
     AttackSchedule,
     Iteration,
     Validation,
@@ -178,9 +178,11 @@ def _checkpointed(
     schedule = AttackSchedule(**settings.model_dump(exclude={"rendered_viewpoints"}))
     near = instance.target_path[: settings.rendered_viewpoints]
     views = attacked_views(context, instance, near, "attack")
-    objective = attack_objective(context.agent, context.table, instance, instance.train)
+    objective = attack_objective(context.agent, context.table, instance, instance.train, views)
     validation = attacked_views(context, instance, None, "validation")
-    held_out = attack_objective(context.agent, context.table, instance, instance.validation)
+    held_out = attack_objective(
+        context.agent, context.table, instance, instance.validation, validation
+    )
     seed = context.seed("attack", instance.id)
     for row in optimise(texture, views, objective, schedule, seed, first):
         append_row(files.log, row._asdict())
