@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import Tensor
 
@@ -12,7 +14,8 @@ from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
 from vlnhijack.experiments.config import ExperimentConfig
-from vlnhijack.experiments.instances import Scan
+from vlnhijack.experiments.instances.houses import rendered_places
+from vlnhijack.experiments.instances.rules import Scan
 from vlnhijack.experiments.views import coverage_table
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
@@ -45,13 +48,18 @@ class Context:
         return seeds.integer(self.config.seed, *names)
 
     @cached_property
-    def scans(self) -> dict[str, Scan]:
-        """Coverage and episodes of every house."""
+    def coverage(self) -> dict[str, NDArray[np.float32]]:
+        """Share (M,36,O) of every view that each object fills, of every house."""
         height, width = self.agent.encoder.image_size
+        return {name: coverage_table(house, width, height) for name, house in self.houses.items()}
+
+    @cached_property
+    def scans(self) -> dict[str, Scan]:
+        """What decides the instances of every house."""
         return {
             name: Scan(
-                house=house,
-                coverage=coverage_table(house, width, height),
+                graph=house.graph,
+                places=rendered_places(house, self.coverage[name]),
                 train=episodes_of(house, "train"),
                 val_seen=episodes_of(house, "val_seen"),
             )

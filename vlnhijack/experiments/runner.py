@@ -23,7 +23,7 @@ from vlnhijack.experiments.baseline import baseline
 from vlnhijack.experiments.config import ExperimentConfig
 from vlnhijack.experiments.context import Context, load_context
 from vlnhijack.experiments.evaluation_stage import evaluate
-from vlnhijack.experiments.instances import draw, pick
+from vlnhijack.experiments.instances.houses import draw, pick
 from vlnhijack.experiments.pictures import illustrate
 from vlnhijack.experiments.yaml_config import load_config, save_config
 from vlnhijack.threat import AttackInstance
