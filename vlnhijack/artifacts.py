@@ -24,6 +24,7 @@ T = TypeVar("T")
 
 _CHUNK = 1 << 20
 _LONGEST_ITEM = 1 << 26
+_TAIL = 3  # characters after a number that show where it ends: 1 may go on as 1e+5
 _SPACE = re.compile(r"[ \t\n\r]*")
 
 
@@ -173,13 +174,13 @@ class _ListReader:
         return found
 
     def item(self) -> Any:
-        """Go past the next item; one that touches the end of the piece may be cut, so read on."""
+        """Go past the next item, reading on until what follows shows that it is whole."""
         self.peek()
         while True:
             try:
                 value, end = self._decoder.raw_decode(self._text, self._at)
                 length = end - self._at
-                if end < len(self._text) or not self._more():
+                if len(self._text) - end >= _TAIL or not self._more():
                     self._at, self._items = self._at + length, self._items + 1
                     return value
             except (ValueError, RecursionError) as error:

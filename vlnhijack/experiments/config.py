@@ -29,23 +29,27 @@ class DrawnInstances(Settings):
     count: PositiveInt
 
 
+class StoredInstances(Settings):
+    """The attacks of a .json that `vlnhijack instances` wrote; every scan is a house."""
+
+    file: str
+
+
 class InstanceRules(Settings):
     """Which attacks are possible; the defaults are the paper's (section 3.2).
 
     An object of `categories` fills at least min_coverage (at most max_coverage) of a view at
-    v_ATK, which may be the first and the last viewpoint of a test path; at least min_train training
-    episodes on min_paths paths pass through v_ATK after leaving out those with a test episode's
-    guide trajectory; at least min_test test episodes. The attack trajectory ends at least
-    target_distance metres (geodesic) from every test episode's goal, at most max_steps edges from
-    v_ATK; if target_apart also target_distance from v_ATK, if target_off_path at no viewpoint of a
-    test path from v_ATK on. validation is the share of paths kept for choosing the checkpoint.
+    v_ATK; at least min_train training episodes on min_paths paths pass through v_ATK after leaving
+    out those with a test episode's guide trajectory; at least min_test test episodes. The attack
+    trajectory ends at least target_distance metres (geodesic) from every test episode's goal, at
+    most max_steps edges from v_ATK; if target_apart also target_distance from v_ATK, if
+    target_off_path at no viewpoint of a test path from v_ATK on. validation is the share of paths
+    kept for choosing the checkpoint.
     """
 
     categories: tuple[str, ...] = CATEGORIES
     min_coverage: Share = 0.4
     max_coverage: Share = 1.0
-    first_viewpoint: bool = True
-    last_viewpoint: bool = True
     min_train: PositiveInt = 5
     min_paths: Annotated[int, Field(ge=2)] = 2
     min_test: PositiveInt = 1
@@ -69,8 +73,9 @@ class DatasetInstances(Settings):
 
     visibility: an object fills of a view what its REVERIE box does, or its rendered mask;
     category_map: its category is the mpcat40 category of its name, or the name itself; languages
-    of RxR ("en", "hi-IN", …), all by default; per_instruction: an attack for every instruction
-    instead of one for all of a path; max_objects: attacks on so many objects, drawn by the seed.
+    of RxR ("en", "hi-IN", …), all by default; first_viewpoint, last_viewpoint: whether these of a
+    path may be v_ATK; per_instruction: an attack for every instruction instead of one for all of a
+    path; max_objects: attacks on so many objects, drawn by the seed.
     """
 
     dataset: Literal["r2r", "r4r", "rxr", "houses"] = "r2r"
@@ -79,6 +84,8 @@ class DatasetInstances(Settings):
     kind: Kind = "trajectory"
     category_map: Literal["mpcat40", "name"] = "mpcat40"
     languages: tuple[str, ...] = ()
+    first_viewpoint: bool = True
+    last_viewpoint: bool = True
     per_instruction: bool = False
     max_objects: PositiveInt | None = None
     rules: InstanceRules = InstanceRules()
@@ -113,7 +120,7 @@ class ExperimentConfig(Settings):
     seed: int = 0
     threads: PositiveInt = 2
     agent: str = "small"
-    instances: list[PickedInstance] | DrawnInstances
+    instances: list[PickedInstance] | DrawnInstances | StoredInstances
     rules: InstanceRules = InstanceRules()
     rendering: RenderSettings = RenderSettings()
     attack: AttackSettings = AttackSettings()

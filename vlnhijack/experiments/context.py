@@ -13,7 +13,13 @@ from torch import Tensor
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
-from vlnhijack.experiments.config import ExperimentConfig
+from vlnhijack.experiments.config import (
+    DrawnInstances,
+    ExperimentConfig,
+    PickedInstance,
+    StoredInstances,
+)
+from vlnhijack.experiments.instances.files import load_instances
 from vlnhijack.experiments.instances.houses import rendered_places
 from vlnhijack.experiments.instances.rules import Scan
 from vlnhijack.experiments.views import coverage_table
@@ -75,12 +81,17 @@ class Context:
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
     """Load the agent and the houses that the experiment names."""
-    if isinstance(config.instances, list):
-        names = sorted({picked.house for picked in config.instances})
-    else:
-        names = list(config.instances.houses)
-    houses = {name: load_house(house_folder(name)) for name in names}
+    houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
     return Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+
+
+def house_list(wanted: list[PickedInstance] | DrawnInstances | StoredInstances) -> list[str]:
+    """The houses that an experiment's attacks lie in."""
+    if isinstance(wanted, DrawnInstances):
+        return list(wanted.houses)
+    if isinstance(wanted, StoredInstances):
+        return sorted({attack.scan for attack in load_instances(Path(wanted.file))})
+    return sorted({picked.house for picked in wanted})
 
 
 def agent_file(name: str) -> Path:

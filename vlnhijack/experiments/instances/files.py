@@ -7,12 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pydantic import BaseModel, TypeAdapter
 
-from vlnhijack.artifacts import write_json
+from vlnhijack.artifacts import read_json, validated, write_json
 from vlnhijack.errors import InputError
 from vlnhijack.evaluation.records import save_records
 from vlnhijack.experiments.config import DatasetInstances
 from vlnhijack.threat import AttackInstance
+
+
+class _File(BaseModel):
+    settings: dict[str, Any]
+    summary: dict[str, Any]
+    attacks: list[AttackInstance]
+
+
+_FILE = TypeAdapter(_File)
 
 
 def summarise(attacks: Sequence[AttackInstance]) -> dict[str, Any]:
@@ -40,7 +50,7 @@ def save_instances(
 ) -> None:
     """Write a row per instance to `file` (Parquet), and whole attacks to a .json beside it.
 
-    The JSON holds "settings", "summary" and "attacks", in the form of a run's instances.json.
+    The JSON holds "settings", "summary" and "attacks"; `load_instances` and experiments read it.
     Raises InputError where the name does not end in .parquet.
     """
     if file.suffix != ".parquet":
@@ -53,6 +63,11 @@ def save_instances(
         "attacks": [asdict(attack) for attack in attacks],
     }
     write_json(file.with_suffix(".json"), whole)
+
+
+def load_instances(file: Path) -> list[AttackInstance]:
+    """The attacks of a .json that `save_instances` wrote; InputError where it is none."""
+    return validated(_FILE, read_json(file), file).attacks
 
 
 def _row(attack: AttackInstance, number: int) -> dict[str, Any]:

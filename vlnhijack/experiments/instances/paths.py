@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from vlnhijack import seeds
-from vlnhijack.experiments.config import DatasetInstances, InstanceRules
+from vlnhijack.experiments.config import DatasetInstances
 from vlnhijack.experiments.instances.rules import (
     Attempt,
     Place,
@@ -26,31 +26,33 @@ def construct(scans: Sequence[Scan], settings: DatasetInstances) -> list[AttackI
     instances: list[AttackInstance] = []
     for scan in scans:
         for path in _paths(scan.val_seen):
-            place = attack_place(scan, path, settings.rules)
+            place = attack_place(scan, path, settings)
             if place is not None:
                 instances += _attacks(scan, path, place, settings)
     return _capped(instances, settings)
 
 
-def attack_place(scan: Scan, path: Sequence[Episode], rules: InstanceRules) -> Place | None:
+def attack_place(scan: Scan, path: Sequence[Episode], settings: DatasetInstances) -> Place | None:
     """The place that the episodes of one path are attacked at, None where the path has none.
 
     Ties go to the viewpoint that comes first, then to the object that comes first.
     """
-    viewpoints = path[0].path
-    first, last = viewpoints[0], viewpoints[-1]
+    rules = settings.rules
     best: Place | None = None
-    for viewpoint in dict.fromkeys(viewpoints):
-        allowed = (rules.first_viewpoint or viewpoint != first) and (
-            rules.last_viewpoint or viewpoint != last
-        )
+    for viewpoint in _allowed(path[0].path, settings):
         places = [p for p in scan.places_at.get(viewpoint, ()) if attackable(p, rules)]
-        if not allowed or not places or not supported(support(scan, viewpoint, path), rules):
+        if not places or not supported(support(scan, viewpoint, path), rules):
             continue
         largest = max(places, key=lambda place: place.coverage)
         if best is None or largest.coverage > best.coverage:
             best = largest
     return best
+
+
+def _allowed(path: Sequence[str], settings: DatasetInstances) -> list[str]:
+    left_out = {path[0]} if not settings.first_viewpoint else set()
+    left_out |= {path[-1]} if not settings.last_viewpoint else set()
+    return [viewpoint for viewpoint in dict.fromkeys(path) if viewpoint not in left_out]
 
 
 def _attacks(
