@@ -60,8 +60,11 @@ def test_what_is_wrong_with_a_list_is_said(file: Path, text: str, expected: str)
         list(stream_json_list(file))
 
 
-def test_only_a_piece_is_read_for_the_first_item(file: Path) -> None:
-    file.write_text("[" + ",".join(["1"] * 3_000_000) + ", broken]")
+def test_only_a_piece_is_read_for_the_first_item(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(artifacts, "_CHUNK", 16)
+    file.write_text("[" + ",".join(["1"] * 100) + ", broken]")
     items = stream_json_list(file)
     assert next(items) == 1
     with pytest.raises(InputError, match="not valid JSON"):

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from vlnhijack.artifacts import stream_json_lines, stream_json_list, validated
 from vlnhijack.errors import InputError
@@ -34,12 +34,6 @@ class R2RRecord(PathRecord):
     instructions: Annotated[list[Instruction], Field(min_length=1)]
     instr_encodings: list[Tokens] | None = None
 
-    @model_validator(mode="after")
-    def _one_encoding_each(self) -> "R2RRecord":
-        if self.instr_encodings and len(self.instr_encodings) != len(self.instructions):
-            raise ValueError(f"{len(self.instructions)} instr_encodings, one per instruction")
-        return self
-
 
 class RxRRecord(PathRecord):
     """A guide annotation of Room-across-Room; HAMT's `_enc_xlmr` files add instr_encoding."""
@@ -58,7 +52,16 @@ def r2r_records(file: Path) -> Iterator[tuple[str, R2RRecord]]:
     """The records of a .json(.gz) file, each with its name for error messages."""
     for number, value in enumerate(stream_json_list(file)):
         record = validated(_R2R, value, file, f"record {number}")
-        yield f"record {number} (path_id {record.path_id})", record
+        where = f"record {number} (path_id {record.path_id})"
+        encodings = record.instr_encodings
+        if encodings is not None and len(encodings) != len(record.instructions):
+            raise InputError(
+                file=file,
+                field=f"{where}: instr_encodings",
+                expected=f"{len(record.instructions)} lists, one per instruction",
+                received=len(encodings),
+            )
+        yield where, record
 
 
 def rxr_records(file: Path, languages: Sequence[str]) -> Iterator[tuple[str, RxRRecord]]:

@@ -109,7 +109,10 @@ def test_languages_are_selected_by_tag(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"instr_encodings": [[1]]}, "record 0: Value error, 2 instr_encodings"),
+        (
+            {"instr_encodings": [[1]]},
+            r"record 0 \(path_id 7\): instr_encodings: expected 2 lists, .* received 1",
+        ),
         ({"instr_encodings": [[1], []]}, r"record 0: instr_encodings\.1"),
         ({"instr_encodings": [[1], ["a"]]}, r"record 0: instr_encodings\.1\.0"),
     ],

@@ -158,6 +158,6 @@ def _target_fits(
 
 def _held_out(train: Sequence[Episode], share: float, seed: int) -> set[int]:
     paths = sorted({e.path_id for e in train})
-    count = min(int(np.ceil(share * len(paths))), len(paths) - 1)
+    count = min(int(np.ceil(share * len(paths) - _TOLERANCE)), len(paths) - 1)
     order = seeds.stream(seed, "validation").permutation(len(paths))
     return {paths[row] for row in order[:count]}
