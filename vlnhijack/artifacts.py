@@ -29,6 +29,16 @@ _SPACE = re.compile(r"[ \t\n\r]*")
 
 
 @contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """An OSError of the block that names no file, such as that of a full disk, names `path`."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
+
+
+@contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary path with the same suffix that replaces `path` when the block succeeds."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -38,7 +48,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
+        with _named(path):
+            yield temporary
         temporary.chmod(0o644)
         temporary.replace(path)
     finally:
@@ -51,7 +62,8 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     try:
-        yield temporary
+        with _named(path):
+            yield temporary
         temporary.chmod(0o755)
         if path.exists():
             shutil.rmtree(path)
@@ -199,7 +211,7 @@ class _ListReader:
 
 def append_row(path: Path, row: dict[str, Any]) -> None:
     """Add a line to a JSONL file."""
-    with path.open("a") as file:
+    with _named(path), path.open("a") as file:
         file.write(json.dumps(row) + "\n")
 
 

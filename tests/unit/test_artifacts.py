@@ -1,82 +1,51 @@
-"""JSON lists and lines, read piece by piece."""
-
-import gzip
-import json
+import errno
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from tests.fuzz import VALUES, refused_or_read, texts
-from vlnhijack import artifacts
-from vlnhijack.artifacts import read_json, stream_json_lines, stream_json_list
-from vlnhijack.errors import InputError
+from vlnhijack.artifacts import append_row, atomic_folder, atomic_path, read_rows, write_json
 
-LISTS = st.lists(VALUES, max_size=6)
+FULL = "No space left on device"
 
 
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("json") / "list.json"
+def fill(_: Path) -> None:
+    raise OSError(errno.ENOSPC, FULL)
 
 
-@settings(max_examples=80, deadline=None)
-@given(LISTS, st.integers(1, 30), st.sampled_from([None, 0, 2]))
-def test_a_list_is_the_same_whatever_the_pieces(
-    file: Path, values: list[Any], chunk: int, indent: int | None
-) -> None:
-    file.write_text(json.dumps(values, indent=indent))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(artifacts, "_CHUNK", chunk)
-        assert repr(list(stream_json_list(file))) == repr(json.loads(file.read_text()))
+@pytest.mark.parametrize("atomic", [atomic_path, atomic_folder])
+def test_a_full_disk_is_named_and_leaves_the_old_one(tmp_path: Path, atomic: Callable) -> None:
+    place = tmp_path / "kept"
+    with atomic(place) as new:
+        (new / "a" if new.is_dir() else new).write_text("old")
+    before = {path: path.is_dir() or path.read_text() for path in tmp_path.rglob("*")}
+    with pytest.raises(OSError, match=FULL) as caught, atomic(place) as new:
+        fill(new)
+    assert caught.value.filename == str(place)
+    assert {path: path.is_dir() or path.read_text() for path in tmp_path.rglob("*")} == before
 
 
-@settings(max_examples=80, deadline=None)
-@given(texts([1, "two", {"three": [4, 5]}]), st.integers(1, 30))
-def test_any_other_file_is_refused_in_one_line(file: Path, content: bytes, chunk: int) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(artifacts, "_CHUNK", chunk)
-        patch.setattr(artifacts, "_LONGEST_ITEM", 200)
-        refused_or_read(file, content, lambda path: list(stream_json_list(path)))
-        refused_or_read(file, content, lambda path: list(stream_json_lines(path)))
+def test_writing_to_a_full_device_names_the_file() -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("no /dev/full on this system")
+    with pytest.raises(OSError, match=FULL) as caught:
+        append_row(full, {"a": 1})
+    assert caught.value.filename == str(full)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("", "expected a JSON list with .* received 'the end of the file'"),
-        ('{"a": 1}', "expected a JSON list"),
-        ("[1, 2", "record 2: expected a JSON list with , or ]"),
-        ("[1, 2]]", "nothing after the list"),
-        ("[1 2]", "record 1: expected .* received '2'"),
-        ("[1, {]", "record 1: not valid JSON"),
-    ],
-)
-def test_what_is_wrong_with_a_list_is_said(file: Path, text: str, expected: str) -> None:
-    file.write_text(text)
-    with pytest.raises(InputError, match=expected):
-        list(stream_json_list(file))
+def test_rows_survive_a_line_cut_off(tmp_path: Path) -> None:
+    file = tmp_path / "rows.jsonl"
+    append_row(file, {"a": 1})
+    append_row(file, {"a": 2})
+    with file.open("a") as rows:
+        rows.write('{"a": ')
+    assert read_rows(file) == [{"a": 1}, {"a": 2}]
 
 
-def test_only_a_piece_is_read_for_the_first_item(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(artifacts, "_CHUNK", 16)
-    file.write_text("[" + ",".join(["1"] * 100) + ", broken]")
-    items = stream_json_list(file)
-    assert next(items) == 1
-    with pytest.raises(InputError, match="not valid JSON"):
-        list(items)
-
-
-def test_gzipped_files_read_the_same(tmp_path: Path) -> None:
-    packed = tmp_path / "list.json.gz"
-    packed.write_bytes(gzip.compress(b'[{"a": 1}]'))
-    assert read_json(packed) == list(stream_json_list(packed)) == [{"a": 1}]
-    packed.write_bytes(packed.read_bytes()[:-4])
-    with pytest.raises(InputError, match="not a readable text file"):
-        read_json(packed)
-    with pytest.raises(InputError, match="no such file"):
-        read_json(tmp_path / "none.json")
+def test_json_replaces_the_whole_file(tmp_path: Path) -> None:
+    file = tmp_path / "deep" / "a.json"
+    write_json(file, [1] * 1000)
+    write_json(file, {"b": "é"})
+    assert file.read_text() == '{\n "b": "é"\n}\n'
+    assert [path.name for path in file.parent.iterdir()] == ["a.json"]

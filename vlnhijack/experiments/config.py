@@ -2,7 +2,8 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from vlnhijack.experiments.yaml_config import Settings
 
@@ -19,6 +20,13 @@ class PickedInstance(Settings):
     object: str
     viewpoint: str
     target: str | None = None
+
+    @field_validator("target")
+    @classmethod
+    def _only_for_trajectories(cls, target: str | None, info: ValidationInfo) -> str | None:
+        if target is not None and info.data.get("kind") == "single_step":
+            raise PydanticCustomError("target", "no target: a single_step attack stops at once")
+        return target
 
 
 class DrawnInstances(Settings):
