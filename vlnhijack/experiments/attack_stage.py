@@ -119,16 +119,16 @@ def object_views(
 
     Their rows of the table (V,), view indices (V,) and cameras.
     """
-    scan = context.scans[instance.scan]
-    column = [item.id for item in scan.house.objects].index(instance.object_id)
-    seen = scan.coverage[:, :, column] > 0
+    house = context.houses[instance.scan]
+    column = [item.id for item in house.objects].index(instance.object_id)
+    seen = context.coverage[instance.scan][:, :, column] > 0
     if viewpoints is not None:
         allowed = np.zeros(len(seen), bool)
-        allowed[[scan.house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
+        allowed[[house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
         seen &= allowed[:, None]
     rows, views = np.nonzero(seen)
     height, width = context.agent.encoder.image_size
-    cameras = house_cameras(scan.house.graph, width, height)
+    cameras = house_cameras(house.graph, width, height)
     wanted = [cameras[VIEWS * row + view] for row, view in zip(rows, views, strict=True)]
     start = context.rows(instance.scan).start
     return torch.from_numpy(rows + start), torch.from_numpy(views), wanted

@@ -20,12 +20,12 @@ class Settings(BaseModel):
 Config = TypeVar("Config", bound=Settings)
 
 
-def load_config(file: Path, model: type[Config], overrides: Sequence[str] = ()) -> Config:
-    """Read `file`, apply `key.sub=value` overrides (values are YAML), and validate.
+def load_config(file: Path | None, model: type[Config], overrides: Sequence[str] = ()) -> Config:
+    """Read `file` (None: all defaults), apply `key.sub=value` overrides (YAML), and validate.
 
     Raises InputError that names file, key, expected and received.
     """
-    values = _read(file)
+    values = {} if file is None else _read(file)
     for override in overrides:
         _override(values, override)
     try:
@@ -67,7 +67,7 @@ def _override(values: dict[str, Any], override: str) -> None:
         raise InputError(field=f"--set {key}", expected="a YAML value", received=text) from None
 
 
-def _deepest_error(file: Path, values: dict[str, Any], error: ValidationError) -> InputError:
+def _deepest_error(file: Path | None, values: dict[str, Any], error: ValidationError) -> InputError:
     """Of the alternatives of a union, the one that fits furthest is the one that was meant."""
     found = max(error.errors(), key=lambda each: len(each["loc"]))
     expected, received = found["msg"].removeprefix("Input should be "), found["input"]

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.houses import tiny_house
-from tests.worlds import grid_graph, walks
-from vlnhijack import seeds
+from tests.grids import grid_graph
 from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import InstanceRules, PickedInstance
-from vlnhijack.experiments.instances import Scan, build, draw, pick
+from vlnhijack.experiments.instances.houses import at_place, draw, pick, rendered_places
+from vlnhijack.experiments.instances.rules import Place, Scan, build
+from vlnhijack.scenes.house import House, HouseObject
 from vlnhijack.threat import AttackInstance, guide
 
 CABINET, TABLE = "cabinet_0", "table_0"
@@ -20,28 +20,19 @@ KINDS = ("single_step", "trajectory")
 RULES = InstanceRules(min_train=3, min_test=1)
 
 
-@pytest.fixture(scope="module")
-def scan() -> Scan:
-    """Every fifth path is val_seen; the table fills 30 % and the cabinet 50 % everywhere."""
-    graph = grid_graph("east")
-    coverage = np.zeros((12, 36, 2), np.float32)
-    coverage[:, 13] = (0.5, 0.3)
-    episodes = walks(graph, shortest=3)
-    held_out = set(seeds.stream(0, "split").permutation(episodes[-1].path_id + 1)[::5].tolist())
-    return Scan(
-        house=replace(tiny_house(), name="east", graph=graph),
-        coverage=coverage,
-        train=[e for e in episodes if e.path_id not in held_out],
-        val_seen=[e for e in episodes if e.path_id in held_out],
-    )
-
-
 def rules(**changes: Any) -> InstanceRules:
     return RULES.model_copy(update=changes)
 
 
+def attempt(
+    scan: Scan, kind: Any, viewpoint: str, rules: InstanceRules, seed: int = 0
+) -> AttackInstance | None:
+    place = next(p for p in scan.places if (p.object_id, p.viewpoint) == (CABINET, viewpoint))
+    return build(scan, at_place(scan, kind, place), rules, seed)
+
+
 def built(scan: Scan, kind: Any, viewpoint: str = AT, seed: int = 0) -> AttackInstance:
-    instance = build(scan, kind, CABINET, viewpoint, RULES, seed)
+    instance = attempt(scan, kind, viewpoint, RULES, seed)
     assert instance is not None
     return instance
 
@@ -50,7 +41,7 @@ def places(
     scan: Scan, kind: Any, rules: InstanceRules = RULES, seed: int = 0
 ) -> list[AttackInstance]:
     """Every possible instance of the cabinet."""
-    found = [build(scan, kind, CABINET, v, rules, seed) for v in scan.house.graph.viewpoints]
+    found = [attempt(scan, kind, viewpoint, rules, seed) for viewpoint in scan.graph.viewpoints]
     return [instance for instance in found if instance is not None]
 
 
@@ -106,8 +97,8 @@ def test_all_the_support_is_used(scan: Scan) -> None:
 
 @pytest.mark.parametrize("longest", [2, 5])
 def test_attack_trajectories_lead_away(scan: Scan, longest: int) -> None:
-    graph = scan.house.graph
-    limited = rules(max_steps=longest)
+    graph = scan.graph
+    limited = rules(max_steps=longest, target_apart=True, target_off_path=True)
     instances = [i for seed in range(6) for i in places(scan, "trajectory", limited, seed)]
     assert len({(i.viewpoint, i.trajectory) for i in instances}) > 10
     for instance in instances:
@@ -130,14 +121,15 @@ def test_too_few_episodes_give_no_instance(scan: Scan) -> None:
     }
     for name, count in enough.items():
         exact, more = rules(**{name: count}), rules(**{name: count + 1})
-        assert build(scan, "single_step", CABINET, AT, exact, 0) is not None
-        assert build(scan, "single_step", CABINET, AT, more, 0) is None, name
+        assert attempt(scan, "single_step", AT, exact) is not None
+        assert attempt(scan, "single_step", AT, more) is None, name
 
 
 @pytest.mark.parametrize(
     ("share", "changes", "allowed"),
     [
         (0.4, {}, True),
+        (0.4 - 1e-10, {}, True),
         (0.399, {}, False),
         (0.7, {"min_coverage": 0.7}, True),
         (0.6, {"max_coverage": 0.6}, True),
@@ -148,10 +140,7 @@ def test_too_few_episodes_give_no_instance(scan: Scan) -> None:
 def test_the_object_has_to_fill_its_view(
     scan: Scan, share: float, changes: dict[str, Any], allowed: bool
 ) -> None:
-    """0.6 and 0.7 are no float32 numbers: the thresholds allow for their rounding."""
-    coverage = np.zeros_like(scan.coverage)
-    coverage[scan.house.graph.row(AT), 20, 0] = share
-    scan = replace(scan, coverage=coverage)
+    scan = replace(scan, places=[Place(CABINET, "cabinet", AT, share)])
     if not allowed:
         with pytest.raises(InputError, match="all there are"):
             draw([scan], "single_step", 1, rules(**changes), seed=0)
@@ -207,9 +196,23 @@ def test_a_picked_instance_that_breaks_a_rule_is_refused(
 ) -> None:
     """east07 is a neighbour of east06, nearer than 3 m."""
     with pytest.raises(InputError, match=f"^east: .*{expected}"):
-        pick(scan, picked(**changes), RULES, seed=0)
+        pick(scan, picked(**changes), rules(target_apart=True), seed=0)
 
 
 def test_a_picked_object_is_of_the_categories(scan: Scan) -> None:
     with pytest.raises(InputError, match="received 'a cabinet"):
         pick(scan, picked(), rules(categories=("table",)), seed=0)
+
+
+def test_what_a_house_shows_is_the_largest_share_of_a_view() -> None:
+    """0.7 is no float32 number: the share that is rendered still passes as 0.7."""
+    graph = grid_graph("east")
+    names = ("cabinet_0", "table_0")
+    objects = tuple(HouseObject(n, n[:-2], "room", (0, 0, 0), (1, 1, 1)) for n in names)
+    coverage = np.zeros((len(graph.viewpoints), 36, 2), np.float32)
+    coverage[3, [7, 8], 1] = (0.7, 0.2)
+    places = rendered_places(House("east", "baked", (), objects, (), graph), coverage)
+    assert [(p.object_id, p.category, p.viewpoint) for p in places if p.coverage] == [
+        ("table_0", "table", graph.viewpoints[3])
+    ]
+    assert max(place.coverage for place in places) == 0.7
