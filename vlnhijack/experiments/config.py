@@ -1,6 +1,6 @@
 """What an experiment file may say."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -132,3 +132,12 @@ class ExperimentConfig(Settings):
     rules: InstanceRules = InstanceRules()
     rendering: RenderSettings = RenderSettings()
     attack: AttackSettings = AttackSettings()
+
+    @field_validator("instances")
+    @classmethod
+    def _once(cls, instances: Any) -> Any:
+        picked = instances if isinstance(instances, list) else []
+        places = {(p.kind, p.house, p.object, p.viewpoint) for p in picked}
+        if len(places) < len(picked):
+            raise PydanticCustomError("instances", "each kind, house, object and viewpoint once")
+        return instances

@@ -116,6 +116,12 @@ def test_a_single_step_attack_has_no_target(tmp_path: Path) -> None:
     assert found.startswith("a.yaml: instances.0.target: expected no target")
 
 
+def test_a_place_is_picked_once(tmp_path: Path) -> None:
+    twice = PICKED + PICKED.strip().splitlines()[-1].replace("target: b", "target: c")
+    found = message(write(tmp_path, twice))
+    assert found.startswith("a.yaml: instances: expected each kind, house, object and viewpoint")
+
+
 def test_overrides_replace_single_values(tmp_path: Path) -> None:
     file = write(tmp_path, DRAWN)
     overrides = ["attack.batch=4", "instances.count=7", "rendering.rung=mitsuba"]
