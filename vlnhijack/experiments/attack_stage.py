@@ -221,7 +221,7 @@ def _save_checkpoint(
     files: AttackFiles, texture: ProjectedAdam, found: Validation, seed: int, seconds: float
 ) -> None:
     """Texture, Adam's state, and what the random streams hang on: seed and iteration."""
-    streams = {"seed": str(seed), "iteration": str(found.iteration)}
+    streams = {"streams": f"seed {seed}, iteration {found.iteration}"}
     write_bytes(files.state(found.iteration), save(texture.state(), streams))
     write_exr(files.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
     append_row(files.validations, {**found._asdict(), "seconds": seconds})
