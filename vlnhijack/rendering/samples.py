@@ -59,7 +59,8 @@ def views_sensor(cameras: Sequence[Camera], spp: int, film: Film = "box") -> Any
         "sample_border": False,
     }
     sampler = {"type": SAMPLER, "sample_count": spp}
-    sensor = mi.load_dict({"type": "vlnhijack_views", "film": content, "sampler": sampler})
+    source = {"type": "vlnhijack_views", "film": content, "sampler": sampler}
+    sensor = mi.load_dict(source, parallel=False)
     sensor.aim(cameras)
     return sensor
 
