@@ -25,7 +25,7 @@ from vlnhijack.experiments.views import encode_cameras
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
-from vlnhijack.threat import AttackInstance
+from vlnhijack.threat import AttackInstance, Texture
 
 _SEEDS = 8
 
