@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from vlnhijack.frames import Camera
-from vlnhijack.rendering.mitsuba_scene import build_scene, texture_key
+from vlnhijack.rendering.mitsuba_scene import bitmap_shape, build_scene, texture_key
 from vlnhijack.rendering.observe import LIT_DEPTH
 from vlnhijack.rendering.renderer import require_texture
 from vlnhijack.rendering.samples import image_size, runs, views_sensor
@@ -53,6 +53,7 @@ class MitsubaRenderer:
         """Images (V,3,h,w) of a texture (H,W,3); InputError for another shape."""
         require_texture(texture, self.texture_shape)
         values = texture if self._exposure is None else _decode(texture)
+        values = values.expand(bitmap_shape(self.texture_shape))
         films = [
             self._render(values, sensor, run.seed, self._gradient_seed(run.first))
             for sensor, run in zip(
