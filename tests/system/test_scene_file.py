@@ -23,7 +23,7 @@ UV = np.array([[0, 0], [0, 1], [1, 1], [1, 0]], np.float32)
 def _render(house: House, folder: Path, spp: int) -> np.ndarray:
     mi = activate()
     save_house(house, folder)
-    return np.array(mi.render(mi.load_file(str(folder / "scene.xml")), spp=spp))
+    return np.array(mi.render(mi.load_file(str(folder / "scene.xml"), parallel=False), spp=spp))
 
 
 def _bare(house: House, corners: list[list[float]], texture: np.ndarray, **changes: Any) -> House:

@@ -178,13 +178,12 @@ class Hamt(nn.Module):
         ob_mask: Tensor,
     ) -> Tensor:
         """The logits of `outputs`; rows of the last layer that no logit reads are left out."""
-        observation = self._embed_observation(ob_image, ob_angle, nav_type)
-        visual_mask = torch.cat([history_mask, ob_mask], 1)
-        visual = torch.cat([history, observation], 1)
+        visual = torch.cat([history, self._embed_observation(ob_image, ob_angle, nav_type)], 1)
+        masks = text_mask, torch.cat([history_mask, ob_mask], 1)
         start = history.shape[1]
         width = int(nav_type.any(0).nonzero().max()) + 1
         navigable = slice(start, start + width)
-        new_text, tokens = self._cross(text, text_mask, visual, visual_mask, CLS, navigable)
+        new_text, tokens = self._cross(text, visual, masks, (CLS, navigable))
         logits = self._logits(new_text, tokens, nav_type[:, :width])
         return F.pad(logits, (0, nav_type.shape[1] - width), value=-torch.inf)
 
@@ -201,10 +200,9 @@ class Hamt(nn.Module):
     ) -> HamtOutputs:
         """Logits (B,N) and every token of the last layer: text (B,T,H), history (B,S,H) and
         observation (B,N,H)."""
-        observation = self._embed_observation(ob_image, ob_angle, nav_type)
-        visual_mask = torch.cat([history_mask, ob_mask], 1)
-        visual = torch.cat([history, observation], 1)
-        new_text, tokens = self._cross(text, text_mask, visual, visual_mask, ALL, ALL)
+        visual = torch.cat([history, self._embed_observation(ob_image, ob_angle, nav_type)], 1)
+        masks = text_mask, torch.cat([history_mask, ob_mask], 1)
+        new_text, tokens = self._cross(text, visual, masks, (ALL, ALL))
         new_history, new_observation = tokens.split([history.shape[1], nav_type.shape[1]], 1)
         logits = self._logits(new_text[:, CLS], new_observation, nav_type)
         return HamtOutputs(logits, new_text, new_history, new_observation)
@@ -223,21 +221,18 @@ class Hamt(nn.Module):
     def _cross(
         self,
         text: Text,
-        text_mask: Tensor,
         visual: Tensor,
-        visual_mask: Tensor,
-        text_rows: slice,
-        visual_rows: slice,
+        masks: tuple[Tensor, Tensor],
+        last_rows: tuple[slice, slice],
     ) -> tuple[Tensor, Tensor]:
         """Runs the cross layers; the last one computes the given rows only."""
-        text_scores = additive_mask(text_mask, self.dtype)
-        visual_scores = additive_mask(visual_mask, self.dtype)
+        text_scores, visual_scores = (additive_mask(mask, self.dtype) for mask in masks)
         last = self.config.num_x_layers - 1
         current = text if isinstance(text, Tensor) else text[0]
         for index, layer in enumerate(self.encoder.x_layers):
             if isinstance(text, tuple):
                 current = text[index]
-            rows = (text_rows, visual_rows) if index == last else (ALL, ALL)
+            rows = last_rows if index == last else (ALL, ALL)
             current, visual = layer(current, text_scores, visual, visual_scores, *rows)
         return current, visual
 

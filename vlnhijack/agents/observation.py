@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from vlnhijack.errors import InputError
 from vlnhijack.navigation.candidates import candidates
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.navigation.views import angle_features, view_angles
@@ -69,9 +70,15 @@ class ObservationTable:
         return Observation(rows, angles, self.nav_types[viewpoints], self.mask[viewpoints])
 
     def actions(self, viewpoints: Tensor, targets: Tensor) -> Tensor:
-        """Tokens (K,) that lead from viewpoints (K,) to targets (K,); a target −1 means STOP."""
+        """Tokens (K,) that lead from viewpoints (K,) to targets (K,); a target −1 means STOP.
+
+        Raises InputError where a target is no neighbour.
+        """
         matches = self.targets[viewpoints] == targets[:, None]
         matches &= self.nav_types[viewpoints] == NAVIGABLE
+        for row in torch.nonzero((targets >= 0) & ~matches.any(1)).flatten().tolist():
+            here, there = self.viewpoint(int(viewpoints[row])), self.viewpoint(int(targets[row]))
+            raise InputError(field="step", expected=f"a neighbour of {here}", received=there)
         return torch.where(targets < 0, self.stops[viewpoints], matches.long().argmax(1))
 
 

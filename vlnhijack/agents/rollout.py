@@ -8,7 +8,13 @@ from torch import Tensor
 
 from vlnhijack.agents.observation import ObservationTable
 from vlnhijack.agents.policy import Policy
-from vlnhijack.agents.trajectory import Instructions, Trajectories, step_logits, trajectories
+from vlnhijack.agents.trajectory import (
+    Instructions,
+    Trajectories,
+    history,
+    step_logits,
+    trajectories,
+)
 from vlnhijack.navigation.episode import Episode
 
 MAX_STEPS = 15
@@ -68,6 +74,7 @@ def _choose(
         policy,
         table,
         features,
+        history(policy, table, features, walked),
         instructions,
         walked,
         torch.arange(len(walked.lengths)),

@@ -84,25 +84,57 @@ def history(
     cls = policy.history_cls(batch)[:, None]
     if steps == 1:
         return cls
-    viewpoints = walked.viewpoints[:, :-1].clamp(min=0).flatten()
-    views = walked.views[:, :-1].flatten()
-    actions = walked.actions(table)[:, :-1].flatten()
-    angles = table.observe(viewpoints, views).angles[torch.arange(len(views)), actions]
+    tokens = _encode(policy, table, features, _taken(table, walked).flatten(0, 1))
+    return torch.cat([cls, tokens.view(batch, steps - 1, -1)], dim=1)
+
+
+def renew_history(
+    policy: Policy,
+    table: ObservationTable,
+    features: Tensor,
+    walked: Trajectories,
+    past: Tensor,
+    changing: Tensor,
+) -> Tensor:
+    """`past`, the history (B,T,H) of other features, with the tokens at changing viewpoints anew.
+
+    changing (M,) bool. Steps that several episodes take are encoded once.
+    """
+    renewed = changing[walked.viewpoints[:, :-1]] & (walked.viewpoints[:, 1:] >= 0)
+    if not renewed.any():
+        return past
+    taken, places = torch.unique(_taken(table, walked)[renewed], dim=0, return_inverse=True)
+    tokens = _encode(policy, table, features, taken)[places]
+    episodes, steps = renewed.nonzero(as_tuple=True)
+    return past.index_put((episodes, steps + 1), tokens)
+
+
+def _taken(table: ObservationTable, walked: Trajectories) -> Tensor:
+    """The first T−1 steps as (B,T−1,4): viewpoint, current view, action and number of the step."""
+    viewpoints, views = walked.viewpoints[:, :-1].clamp(min=0), walked.views[:, :-1]
+    numbers = torch.arange(views.shape[1]).expand_as(views)
+    return torch.stack([viewpoints, views, walked.actions(table)[:, :-1], numbers], dim=-1)
+
+
+def _encode(policy: Policy, table: ObservationTable, features: Tensor, taken: Tensor) -> Tensor:
+    """History tokens (K,H) of the steps (K,4) of `_taken`."""
+    viewpoints, views, actions, numbers = taken.unbind(1)
+    rows = torch.arange(len(taken))
     panorama = features[viewpoints]
-    tokens = policy.encode_history(
-        panorama[torch.arange(len(views)), views],
-        angles,
+    return policy.encode_history(
+        panorama[rows, views],
+        table.observe(viewpoints, views).angles[rows, actions],
         panorama,
         table.view_angle_features[views],
-        torch.arange(steps - 1).repeat(batch),
+        numbers,
     )
-    return torch.cat([cls, tokens.view(batch, steps - 1, -1)], dim=1)
 
 
 def step_logits(
     policy: Policy,
     table: ObservationTable,
     features: Tensor,
+    past: Tensor,
     instructions: Instructions,
     walked: Trajectories,
     episodes: Tensor,
@@ -110,10 +142,9 @@ def step_logits(
 ) -> Tensor:
     """Logits (K,N) of K visual steps: step `steps[k]` of episode `episodes[k]`.
 
-    features (M,36,D) of all viewpoints of the table. Gradients flow to features through the
-    observation and through the history.
+    features (M,36,D) of all viewpoints of the table; past (B,T,H) as `history` gives it. Gradients
+    flow to features through the observation and through the history.
     """
-    past = history(policy, table, features, walked)[episodes]
     past_mask = torch.arange(past.shape[1])[None] <= steps[:, None]
     viewpoints, views = walked.viewpoints[episodes, steps], walked.views[episodes, steps]
     seen = table.observe(viewpoints, views)
@@ -121,7 +152,7 @@ def step_logits(
     return policy(
         read.text,
         read.mask,
-        past,
+        past[episodes],
         past_mask,
         gather_views(features, viewpoints, seen.rows),
         seen.angles,

@@ -11,10 +11,13 @@ from vlnhijack.agents.observation import ObservationTable
 from vlnhijack.agents.trajectory import (
     Instructions,
     Trajectories,
+    history,
     read_instructions,
+    renew_history,
     step_logits,
     trajectories,
 )
+from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.navigation.episode import Episode
 from vlnhijack.threat import AttackInstance, guide
 
@@ -24,7 +27,8 @@ class Objective:
     """Teacher-forced attack trajectories of all the given episodes, tabulated once.
 
     walked: guide + attack trajectory of each of E episodes; first (E,) step at v_ATK;
-    instructions: their encoded text, which never changes.
+    instructions: their encoded text; past (E,T,H): their history in the clean house. Neither is
+    encoded again, but for the history of the `changing` viewpoints (M,).
     """
 
     agent: Agent
@@ -32,18 +36,23 @@ class Objective:
     walked: Trajectories
     first: Tensor
     instructions: Instructions
+    past: Tensor
+    changing: Tensor
 
     def __call__(self, features: Tensor, episodes: Tensor) -> Tensor:
         """Loss of each of the episodes (B,), summed over its attack steps; (B,), in nats.
 
-        features (M,36,D) of all viewpoints; gradients flow through observations and history.
+        features (M,36,D) of all viewpoints, the clean ones but for those that change; gradients
+        flow through observations and history.
         """
         walked = Trajectories(*(part[episodes] for part in self.walked))
         batch, steps = _attack_steps(self.first[episodes], walked.lengths)
+        policy, past = self.agent.policy, self.past[episodes]
         logits = step_logits(
-            self.agent.policy,
+            policy,
             self.table,
             features,
+            renew_history(policy, self.table, features, walked, past, self.changing),
             self.instructions.rows(episodes),
             walked,
             batch,
@@ -55,23 +64,30 @@ class Objective:
 
 
 def attack_objective(
-    agent: Agent, table: ObservationTable, instance: AttackInstance, episodes: Sequence[Episode]
+    agent: Agent,
+    table: ObservationTable,
+    instance: AttackInstance,
+    episodes: Sequence[Episode],
+    views: AttackedViews,
 ) -> Objective:
-    """The objective of an instance over the given episodes."""
+    """The objective of an instance over the given episodes, for textures of the given views."""
     guides = [guide(instance, episode) for episode in episodes]
     attacked = [
         [table.index[instance.scan, viewpoint] for viewpoint in (*walk, *instance.trajectory)]
         for walk in guides
     ]
+    walked = trajectories(table, attacked, [episode.heading for episode in episodes])
     with torch.no_grad():
         instructions = read_instructions(agent.policy, agent.vocabulary, episodes)
-    walked = trajectories(table, attacked, [episode.heading for episode in episodes])
+        past = history(agent.policy, table, views.clean, walked)
     return Objective(
         agent=agent,
         table=table,
         walked=walked,
         first=torch.tensor([len(walk) - 1 for walk in guides]),
         instructions=instructions,
+        past=past,
+        changing=views.changing(),
     )
 
 

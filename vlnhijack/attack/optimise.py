@@ -10,11 +10,10 @@ import torch
 from torch import Tensor
 
 from vlnhijack import seeds
-from vlnhijack.agents.encoder import ViewEncoder
+from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective
 from vlnhijack.attack.projected_adam import ProjectedAdam
 from vlnhijack.errors import CheckError
-from vlnhijack.rendering.renderer import Renderer
 
 
 @dataclass(frozen=True)
@@ -27,25 +26,6 @@ class AttackSchedule:
     lr: float = 0.01
     betas: tuple[float, float] = (0.9, 0.999)
     checkpoint_every: int = 30
-
-
-@dataclass(frozen=True, eq=False)
-class AttackedViews:
-    """The views that the attack renders: V cameras, and their place in the feature table.
-
-    viewpoints (V,) rows and views (V,) indices into features (M,36,D).
-    """
-
-    renderer: Renderer
-    encoder: ViewEncoder
-    clean: Tensor
-    viewpoints: Tensor
-    views: Tensor
-
-    def features(self, texture: Tensor) -> Tensor:
-        """All features (M,36,D) with the rows of the rendered views replaced; differentiable."""
-        rendered = self.encoder(self.renderer(texture))
-        return self.clean.index_put((self.viewpoints, self.views), rendered)
 
 
 class Iteration(NamedTuple):

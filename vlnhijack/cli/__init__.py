@@ -8,6 +8,7 @@ from typer.core import TyperGroup
 
 from vlnhijack import __version__
 from vlnhijack.cli import agent, bench, doctor, house
+from vlnhijack.cli.instances import instances
 from vlnhijack.cli.run import run
 from vlnhijack.errors import VlnHijackError
 
@@ -44,6 +45,7 @@ app = typer.Typer(
     help="Hijack vision-and-language navigation agents by the texture of one object.",
 )
 app.command()(run)
+app.command()(instances)
 app.add_typer(house.app, name="house")
 app.add_typer(agent.app, name="agent")
 app.add_typer(bench.app, name="bench")

@@ -11,6 +11,7 @@ from torch import Tensor
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent
 from vlnhijack.agents.observation import ObservationTable
+from vlnhijack.errors import InputError
 from vlnhijack.evaluation.evaluate import navigate
 from vlnhijack.navigation.episode import Episode
 
@@ -53,7 +54,10 @@ def ablate(
 
 
 def shuffle_instructions(episodes: Sequence[Episode], seed: int) -> list[Episode]:
-    """Every episode with the instruction of another path of the same scan."""
+    """Every episode with the instruction of another path of the same scan.
+
+    Raises InputError where a scan has one path only.
+    """
     rng = seeds.stream(seed, "shuffled instructions")
     shuffled = []
     for episode in episodes:
@@ -62,6 +66,10 @@ def shuffle_instructions(episodes: Sequence[Episode], seed: int) -> list[Episode
             for other in episodes
             if other.scan == episode.scan and other.path_id != episode.path_id
         ]
+        if not others:
+            raise InputError(
+                field=f"paths of {episode.scan}", expected="two or more", received="one"
+            )
         shuffled.append(replace(episode, instruction=others[rng.integers(len(others))]))
     return shuffled
 

@@ -1,5 +1,6 @@
 """Was the texture really applied? What was optimised against what lies on disk."""
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -60,7 +61,9 @@ def check_other_samples(
         raise CheckError(f"apply check: noise-free tiles differ by {constant.max():.2g}")
     if not varies.any():
         return 1.0, 0
-    p = stats.ttest_ind(ours[:, varies], theirs[:, varies], axis=0, equal_var=False).pvalue
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Precision loss", RuntimeWarning)
+        p = stats.ttest_ind(ours[:, varies], theirs[:, varies], axis=0, equal_var=False).pvalue
     threshold = 1 - (1 - _SIGNIFICANCE) ** (1 / p.size)
     smallest = float(np.nanmin(p))
     if smallest < threshold:

@@ -10,7 +10,7 @@ from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import load_agent
 from vlnhijack.agents.observation import observation_table
 from vlnhijack.experiments.context import agent_file
-from vlnhijack.experiments.train_agent import AgentConfig, measure
+from vlnhijack.experiments.train_agent import AgentConfig, measure, what_it_sees
 from vlnhijack.experiments.views import encode_house
 from vlnhijack.scenes.house_files import load_house
 from vlnhijack.settings import house_folder
@@ -34,4 +34,5 @@ def evaluate_agent(name: str, spp: int, seed: int, progress: Progress) -> dict[s
         view_seed = seeds.integer(seed, "views", house.name)
         parts.append(encode_house(house, agent.encoder, spp, view_seed, advance))
     table = observation_table([house.graph for house in houses.values()])
-    return measure(config, agent, table, torch.cat(parts), houses)
+    features = what_it_sees(config, agent, torch.cat(parts))
+    return measure(config, agent, table, features, houses)

@@ -20,9 +20,9 @@ from vlnhijack.artifacts import (
     write_json,
     write_text,
 )
+from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective, attack_objective
 from vlnhijack.attack.optimise import (
-    AttackedViews,
     AttackSchedule,
     Iteration,
     Validation,
@@ -42,7 +42,7 @@ from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.exr import write_exr
 from vlnhijack.scenes.house_files import save_house
 from vlnhijack.scenes.uv_atlas import used_texels
-from vlnhijack.threat import AttackInstance, quantise
+from vlnhijack.threat import AttackInstance, Texture, quantise
 
 RENDERERS = {"frozen": FrozenRenderer, "mitsuba": MitsubaRenderer}
 
@@ -76,6 +76,11 @@ class AttackFiles:
         """The iteration of the last checkpoint that was validated; 0 without one."""
         return max((row["iteration"] for row in read_rows(self.validations)), default=0)
 
+    def best(self) -> Validation:
+        """The checkpoint with the highest nDTW on the validation episodes."""
+        rows = read_rows(self.validations)
+        return best([Validation(row["iteration"], row["ndtw"], row["loss"]) for row in rows])
+
 
 def attack(context: Context, instance: AttackInstance) -> float:
     """Run or finish the attack of an instance; the seconds that its optimisation took."""
@@ -91,14 +96,20 @@ def attack(context: Context, instance: AttackInstance) -> float:
     task = context.progress.add_task(instance.id, total=settings.iterations, completed=first)
     for _ in _checkpointed(context, instance, texture, files, first, task, started):
         pass
-    kept = best([Validation(*_validation_fields(row)) for row in read_rows(files.validations)])
-    final = load_file(files.state(kept.iteration))["texture"].numpy()
-    exported = quantise(final, original, settings.epsilon)
+    exported = exported_texture(context, instance)
     house = context.houses[instance.scan].with_texture(instance.object_id, exported)
     save_house(house, files.house)
     seconds = time.perf_counter() - started
-    write_json(files.result, {"best": kept._asdict(), "seconds": seconds})
+    write_json(files.result, {"best": files.best()._asdict(), "seconds": seconds})
     return seconds
+
+
+def exported_texture(context: Context, instance: AttackInstance) -> Texture:
+    """The best checkpoint's texture (H,W,3) in 8 bits, inside the ε-ball."""
+    files = AttackFiles(context.folder / "attacks" / instance.id)
+    original = context.houses[instance.scan].surface(instance.object_id).texture
+    optimised = load_file(files.state(files.best().iteration))["texture"].numpy()
+    return quantise(optimised, original, context.config.attack.epsilon)
 
 
 def object_views(
@@ -108,16 +119,16 @@ def object_views(
 
     Their rows of the table (V,), view indices (V,) and cameras.
     """
-    scan = context.scans[instance.scan]
-    column = [item.id for item in scan.house.objects].index(instance.object_id)
-    seen = scan.coverage[:, :, column] > 0
+    house = context.houses[instance.scan]
+    column = [item.id for item in house.objects].index(instance.object_id)
+    seen = context.coverage[instance.scan][:, :, column] > 0
     if viewpoints is not None:
         allowed = np.zeros(len(seen), bool)
-        allowed[[scan.house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
+        allowed[[house.graph.row(viewpoint) for viewpoint in viewpoints]] = True
         seen &= allowed[:, None]
     rows, views = np.nonzero(seen)
     height, width = context.agent.encoder.image_size
-    cameras = house_cameras(scan.house.graph, width, height)
+    cameras = house_cameras(house.graph, width, height)
     wanted = [cameras[VIEWS * row + view] for row, view in zip(rows, views, strict=True)]
     start = context.rows(instance.scan).start
     return torch.from_numpy(rows + start), torch.from_numpy(views), wanted
@@ -167,9 +178,11 @@ def _checkpointed(
     schedule = AttackSchedule(**settings.model_dump(exclude={"rendered_viewpoints"}))
     near = instance.target_path[: settings.rendered_viewpoints]
     views = attacked_views(context, instance, near, "attack")
-    objective = attack_objective(context.agent, context.table, instance, instance.train)
+    objective = attack_objective(context.agent, context.table, instance, instance.train, views)
     validation = attacked_views(context, instance, None, "validation")
-    held_out = attack_objective(context.agent, context.table, instance, instance.validation)
+    held_out = attack_objective(
+        context.agent, context.table, instance, instance.validation, validation
+    )
     seed = context.seed("attack", instance.id)
     for row in optimise(texture, views, objective, schedule, seed, first):
         append_row(files.log, row._asdict())
@@ -208,7 +221,7 @@ def _save_checkpoint(
     files: AttackFiles, texture: ProjectedAdam, found: Validation, seed: int, seconds: float
 ) -> None:
     """Texture, Adam's state, and what the random streams hang on: seed and iteration."""
-    streams = {"seed": str(seed), "iteration": str(found.iteration)}
+    streams = {"streams": f"seed {seed}, iteration {found.iteration}"}
     write_bytes(files.state(found.iteration), save(texture.state(), streams))
     write_exr(files.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
     append_row(files.validations, {**found._asdict(), "seconds": seconds})
@@ -225,7 +238,3 @@ def _resume(files: AttackFiles, texture: ProjectedAdam, first: int) -> float:
     texture.load(load_file(files.state(first)))
     validated = {row["iteration"]: row["seconds"] for row in read_rows(files.validations)}
     return float(validated[first])
-
-
-def _validation_fields(row: dict) -> tuple[int, float, float]:
-    return row["iteration"], row["ndtw"], row["loss"]

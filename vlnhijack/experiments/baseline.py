@@ -1,12 +1,14 @@
 """Clean features of every house, and the gate that they pass."""
 
 import time
+from functools import partial
 from pathlib import Path
 
-from safetensors.torch import load_file, save
+import torch
 from torch import Tensor
 
-from vlnhijack.artifacts import read_json, write_bytes, write_json
+from vlnhijack.agents.features import Features, cached_features
+from vlnhijack.artifacts import read_json, sha256, write_json
 from vlnhijack.errors import InputError
 from vlnhijack.evaluation.evaluate import navigate
 from vlnhijack.evaluation.gate import check_baseline
@@ -16,22 +18,26 @@ from vlnhijack.experiments.views import encode_house
 
 def clean_features(context: Context, scan: str) -> Tensor:
     """Features (M,36,D) of the clean house, at the samples of the evaluation."""
-    path = context.folder / "baseline" / f"{scan}.safetensors"
-    if path.exists():
-        return load_file(path)["features"]
-    house = context.houses[scan]
-    task = context.progress.add_task(
-        f"clean views of {scan}", total=36 * len(house.graph.viewpoints)
+    house, encoder = context.houses[scan], context.agent.encoder
+    spp = context.config.rendering.evaluation_spp
+    seed = context.seed("views", "evaluation", scan)
+
+    def encode() -> Features:
+        task = context.progress.add_task(
+            f"clean views of {scan}", total=36 * len(house.graph.viewpoints)
+        )
+        advance = partial(context.progress.advance, task)
+        return encode_house(house, encoder, spp, seed, advance).numpy()
+
+    features = cached_features(
+        context.folder / "baseline" / f"{scan}.hdf5",
+        house.graph,
+        encoder.feature_size,
+        encoder.image_size,
+        f"agent {sha256(context.agent.path)}, {spp} spp, seed {seed}",
+        encode,
     )
-    features = encode_house(
-        house,
-        context.agent.encoder,
-        context.config.rendering.evaluation_spp,
-        context.seed("views", "evaluation", scan),
-        lambda views: context.progress.advance(task, views),
-    )
-    write_bytes(path, save({"features": features}))
-    return features
+    return torch.from_numpy(features)
 
 
 def baseline(context: Context, scan: str) -> float:

@@ -1,8 +1,9 @@
 """What an experiment file may say."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from vlnhijack.experiments.yaml_config import Settings
 
@@ -20,6 +21,13 @@ class PickedInstance(Settings):
     viewpoint: str
     target: str | None = None
 
+    @field_validator("target")
+    @classmethod
+    def _only_for_trajectories(cls, target: str | None, info: ValidationInfo) -> str | None:
+        if target is not None and info.data.get("kind") == "single_step":
+            raise PydanticCustomError("target", "no target: a single_step attack stops at once")
+        return target
+
 
 class DrawnInstances(Settings):
     """Attacks drawn by the seed among all that fulfil the rules of the paper, section 3.2."""
@@ -29,14 +37,21 @@ class DrawnInstances(Settings):
     count: PositiveInt
 
 
+class StoredInstances(Settings):
+    """The attacks of a .json that `vlnhijack instances` wrote; every scan is a house."""
+
+    file: str
+
+
 class InstanceRules(Settings):
-    """Which attacks are possible.
+    """Which attacks are possible; the defaults are the paper's (section 3.2).
 
     An object of `categories` fills at least min_coverage (at most max_coverage) of a view at
     v_ATK; at least min_train training episodes on min_paths paths pass through v_ATK after leaving
     out those with a test episode's guide trajectory; at least min_test test episodes. The attack
-    trajectory ends at least target_distance metres (geodesic) from v_ATK and from every test
-    episode's goal, off its path, at most max_steps edges away. validation is the share of paths
+    trajectory ends at least target_distance metres (geodesic) from every test episode's goal, at
+    most max_steps edges from v_ATK; if target_apart also target_distance from v_ATK, if
+    target_off_path at no viewpoint of a test path from v_ATK on. validation is the share of paths
     kept for choosing the checkpoint.
     """
 
@@ -45,10 +60,44 @@ class InstanceRules(Settings):
     max_coverage: Share = 1.0
     min_train: PositiveInt = 5
     min_paths: Annotated[int, Field(ge=2)] = 2
-    min_test: PositiveInt = 3
+    min_test: PositiveInt = 1
     target_distance: PositiveFloat = 3.0
+    target_apart: bool = False
+    target_off_path: bool = False
     max_steps: PositiveInt = 5
     validation: Annotated[float, Field(gt=0, lt=1)] = 0.2
+
+
+class DatasetFiles(Settings):
+    """Files of a data set that do not lie where they are looked for."""
+
+    connectivity: str | None = None
+    boxes: str | None = None
+    categories: str | None = None
+
+
+class DatasetInstances(Settings):
+    """How `vlnhijack instances` makes attacks from a data set.
+
+    visibility: an object fills of a view what its REVERIE box does, or its rendered mask;
+    category_map: its category is the mpcat40 category of its name, or the name itself; languages
+    of RxR ("en", "hi-IN", …), all by default; first_viewpoint, last_viewpoint: whether these of a
+    path may be v_ATK; per_instruction: an attack for every instruction instead of one for all of a
+    path; max_objects: attacks on so many objects, drawn by the seed.
+    """
+
+    dataset: Literal["r2r", "r4r", "rxr", "houses"] = "r2r"
+    visibility: Literal["reverie-boxes", "masks"] = "reverie-boxes"
+    seed: int = 0
+    kind: Kind = "trajectory"
+    category_map: Literal["mpcat40", "name"] = "mpcat40"
+    languages: tuple[str, ...] = ()
+    first_viewpoint: bool = True
+    last_viewpoint: bool = True
+    per_instruction: bool = False
+    max_objects: PositiveInt | None = None
+    rules: InstanceRules = InstanceRules()
+    files: DatasetFiles = DatasetFiles()
 
 
 class RenderSettings(Settings):
@@ -79,7 +128,16 @@ class ExperimentConfig(Settings):
     seed: int = 0
     threads: PositiveInt = 2
     agent: str = "small"
-    instances: list[PickedInstance] | DrawnInstances
+    instances: list[PickedInstance] | DrawnInstances | StoredInstances
     rules: InstanceRules = InstanceRules()
     rendering: RenderSettings = RenderSettings()
     attack: AttackSettings = AttackSettings()
+
+    @field_validator("instances")
+    @classmethod
+    def _once(cls, instances: Any) -> Any:
+        picked = instances if isinstance(instances, list) else []
+        places = {(p.kind, p.house, p.object, p.viewpoint) for p in picked}
+        if len(places) < len(picked):
+            raise PydanticCustomError("instances", "each kind, house, object and viewpoint once")
+        return instances

@@ -5,14 +5,23 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import Tensor
 
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
-from vlnhijack.experiments.config import ExperimentConfig
-from vlnhijack.experiments.instances import Scan
+from vlnhijack.experiments.config import (
+    DrawnInstances,
+    ExperimentConfig,
+    PickedInstance,
+    StoredInstances,
+)
+from vlnhijack.experiments.instances.files import load_instances
+from vlnhijack.experiments.instances.houses import rendered_places
+from vlnhijack.experiments.instances.rules import Scan
 from vlnhijack.experiments.views import coverage_table
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
@@ -45,13 +54,18 @@ class Context:
         return seeds.integer(self.config.seed, *names)
 
     @cached_property
-    def scans(self) -> dict[str, Scan]:
-        """Coverage and episodes of every house."""
+    def coverage(self) -> dict[str, NDArray[np.float32]]:
+        """Share (M,36,O) of every view that each object fills, of every house."""
         height, width = self.agent.encoder.image_size
+        return {name: coverage_table(house, width, height) for name, house in self.houses.items()}
+
+    @cached_property
+    def scans(self) -> dict[str, Scan]:
+        """What decides the instances of every house."""
         return {
             name: Scan(
-                house=house,
-                coverage=coverage_table(house, width, height),
+                graph=house.graph,
+                places=rendered_places(house, self.coverage[name]),
                 train=episodes_of(house, "train"),
                 val_seen=episodes_of(house, "val_seen"),
             )
@@ -67,12 +81,17 @@ class Context:
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
     """Load the agent and the houses that the experiment names."""
-    if isinstance(config.instances, list):
-        names = sorted({picked.house for picked in config.instances})
-    else:
-        names = list(config.instances.houses)
-    houses = {name: load_house(house_folder(name)) for name in names}
+    houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
     return Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+
+
+def house_list(wanted: list[PickedInstance] | DrawnInstances | StoredInstances) -> list[str]:
+    """The houses that an experiment's attacks lie in."""
+    if isinstance(wanted, DrawnInstances):
+        return list(wanted.houses)
+    if isinstance(wanted, StoredInstances):
+        return sorted({attack.scan for attack in load_instances(Path(wanted.file))})
+    return sorted({picked.house for picked in wanted})
 
 
 def agent_file(name: str) -> Path:

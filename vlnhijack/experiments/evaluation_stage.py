@@ -6,7 +6,6 @@ from functools import partial
 
 import pandas as pd
 import torch
-from safetensors.torch import load_file
 from torch import Tensor
 
 from vlnhijack.artifacts import read_json, write_json
@@ -18,7 +17,7 @@ from vlnhijack.evaluation.apply_check import (
 from vlnhijack.evaluation.controls import noise_textures
 from vlnhijack.evaluation.evaluate import evaluate_instance
 from vlnhijack.evaluation.records import load_records, save_records, to_frame
-from vlnhijack.experiments.attack_stage import AttackFiles, object_views
+from vlnhijack.experiments.attack_stage import AttackFiles, exported_texture, object_views
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.views import encode_cameras
@@ -26,7 +25,7 @@ from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
-from vlnhijack.threat import AttackInstance, Texture, quantise
+from vlnhijack.threat import AttackInstance
 
 _SEEDS = 8
 
@@ -60,7 +59,7 @@ def evaluate(context: Context, instance: AttackInstance) -> tuple[pd.DataFrame, 
 def apply_check(context: Context, instance: AttackInstance, attacked: House) -> dict[str, float]:
     """What was optimised is what lies on disk; raises CheckError where it is not."""
     original = context.houses[instance.scan]
-    texture = _exported(context, instance)
+    texture = exported_texture(context, instance)
     epsilon = context.config.attack.epsilon
     excess = check_texels(
         attacked, instance.object_id, texture, original.surface(instance.object_id).texture, epsilon
@@ -90,14 +89,6 @@ def apply_check(context: Context, instance: AttackInstance, attacked: House) -> 
         "smallest_p_other_samples": smallest_p,
         "tests_other_samples": tests,
     }
-
-
-def _exported(context: Context, instance: AttackInstance) -> Texture:
-    files = AttackFiles(context.folder / "attacks" / instance.id)
-    kept = read_json(files.result)["best"]["iteration"]
-    original = context.houses[instance.scan].surface(instance.object_id).texture
-    optimised = load_file(files.state(kept))["texture"].numpy()
-    return quantise(optimised, original, context.config.attack.epsilon)
 
 
 def _arms(

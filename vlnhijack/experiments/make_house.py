@@ -10,7 +10,7 @@ from vlnhijack.navigation.episode import Episode, save_episodes
 from vlnhijack.rendering.bake import bake
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import save_house
-from vlnhijack.scenes.procedural.episodes import make_episodes
+from vlnhijack.scenes.procedural.episodes import make_episodes, viewpoint_overlap
 from vlnhijack.scenes.procedural.house_maker import make_house
 
 
@@ -41,12 +41,19 @@ def make_house_folder(
     for split, episodes in splits.items():
         save_episodes(folder / "episodes" / f"{split}.json", episodes)
     progress.update(task, completed=3)
-    counts = ", ".join(f"{len(episodes)} {split}" for split, episodes in splits.items())
     return (
         f"{folder}: {house.kind}, {len(house.rooms)} rooms, {len(house.objects)} objects, "
-        f"{len(house.graph.viewpoints)} viewpoints, episodes: {counts}; "
+        f"{len(house.graph.viewpoints)} viewpoints, episodes: {_counts(splits)}; "
         f"{time.perf_counter() - started:.0f} s"
     )
+
+
+def _counts(splits: dict[str, list[Episode]]) -> str:
+    counts = ", ".join(f"{len(episodes)} {split}" for split, episodes in splits.items())
+    if "train" not in splits:
+        return counts
+    overlap = viewpoint_overlap(splits["train"], splits["val_seen"])
+    return f"{counts}, {overlap:.0%} of whose viewpoints are on train paths"
 
 
 def _splits(house: House, seed: int, *, unseen: bool) -> dict[str, list[Episode]]:

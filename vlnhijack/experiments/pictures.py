@@ -45,7 +45,7 @@ def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame
 
 def _best_views(context: Context, instance: AttackInstance) -> list[int]:
     """The views at v_ATK that the object fills most, in the order of the panorama."""
-    scan = context.scans[instance.scan]
-    column = [item.id for item in scan.house.objects].index(instance.object_id)
-    shares = scan.coverage[scan.house.graph.row(instance.viewpoint), :, column]
+    house = context.houses[instance.scan]
+    column = [item.id for item in house.objects].index(instance.object_id)
+    shares = context.coverage[instance.scan][house.graph.row(instance.viewpoint), :, column]
     return sorted(int(view) for view in shares.argsort()[::-1][:_VIEWS] if shares[view] > 0)

@@ -20,10 +20,11 @@ from vlnhijack.evaluation.records import save_records
 from vlnhijack.evaluation.tables import rows_for_print, summarise
 from vlnhijack.experiments.attack_stage import attack
 from vlnhijack.experiments.baseline import baseline
-from vlnhijack.experiments.config import ExperimentConfig
+from vlnhijack.experiments.config import ExperimentConfig, StoredInstances
 from vlnhijack.experiments.context import Context, load_context
 from vlnhijack.experiments.evaluation_stage import evaluate
-from vlnhijack.experiments.instances import draw, pick
+from vlnhijack.experiments.instances.files import load_instances
+from vlnhijack.experiments.instances.houses import draw, pick
 from vlnhijack.experiments.pictures import illustrate
 from vlnhijack.experiments.yaml_config import load_config, save_config
 from vlnhijack.threat import AttackInstance
@@ -93,10 +94,12 @@ def environment(config: ExperimentConfig) -> dict[str, Any]:
 
 
 def make_instances(context: Context) -> list[AttackInstance]:
-    """The experiment's instances: picked by hand, or drawn by the seed."""
+    """The experiment's instances: picked by hand, drawn by the seed, or read from a file."""
     wanted, rules, seed = context.config.instances, context.config.rules, context.config.seed
     if isinstance(wanted, list):
         return [pick(context.scans[picked.house], picked, rules, seed) for picked in wanted]
+    if isinstance(wanted, StoredInstances):
+        return load_instances(Path(wanted.file))
     scans = list(context.scans.values())
     return draw(scans, wanted.kind, wanted.count, rules, seed)
 

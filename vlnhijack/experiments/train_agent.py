@@ -88,13 +88,17 @@ def train_agent(config: AgentConfig, folder: Path, progress: Progress) -> Agent:
     agent = Agent(
         VitEncoder(vit).eval(), hamt, vocabulary, {}, folder / f"{config.name}.safetensors"
     )
-    if config.blind:
-        features = blank_features(agent, features).contiguous()
+    features = what_it_sees(config, agent, features)
     _policy(config, agent, table, features, train, folder, progress)
     metadata = measure(config, agent, table, features, houses)
     save_agent(agent.path, vit, hamt, vocabulary, metadata)
     write_json(folder / "rates.json", metadata)
     return load_agent(agent.path)
+
+
+def what_it_sees(config: AgentConfig, agent: Agent, features: Tensor) -> Tensor:
+    """The features (M,36,D) of all views, or of a grey image everywhere for a blind agent."""
+    return blank_features(agent, features).contiguous() if config.blind else features
 
 
 def measure(

@@ -20,18 +20,18 @@ class Settings(BaseModel):
 Config = TypeVar("Config", bound=Settings)
 
 
-def load_config(file: Path, model: type[Config], overrides: Sequence[str] = ()) -> Config:
-    """Read `file`, apply `key.sub=value` overrides (values are YAML), and validate.
+def load_config(file: Path | None, model: type[Config], overrides: Sequence[str] = ()) -> Config:
+    """Read `file` (None: all defaults), apply `key.sub=value` overrides (YAML), and validate.
 
     Raises InputError that names file, key, expected and received.
     """
-    values = _read(file)
+    values = {} if file is None else _read(file)
     for override in overrides:
         _override(values, override)
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise _deepest_error(file, error) from None
+        raise _deepest_error(file, values, error) from None
 
 
 def save_config(path: Path, config: Settings) -> None:
@@ -67,7 +67,7 @@ def _override(values: dict[str, Any], override: str) -> None:
         raise InputError(field=f"--set {key}", expected="a YAML value", received=text) from None
 
 
-def _deepest_error(file: Path, error: ValidationError) -> InputError:
+def _deepest_error(file: Path | None, values: dict[str, Any], error: ValidationError) -> InputError:
     """Of the alternatives of a union, the one that fits furthest is the one that was meant."""
     found = max(error.errors(), key=lambda each: len(each["loc"]))
     expected, received = found["msg"].removeprefix("Input should be "), found["input"]
@@ -75,5 +75,15 @@ def _deepest_error(file: Path, error: ValidationError) -> InputError:
         expected = "no such key"
     if found["type"] == "missing":
         expected, received = "a value", "nothing"
-    field = ".".join(map(str, found["loc"]))
+    field = ".".join(_keys(values, found["loc"]))
     return InputError(file=file, field=field, expected=expected, received=received)
+
+
+def _keys(values: Any, location: Sequence[str | int]) -> list[str]:
+    """The keys of a location without the names of the alternatives of a union."""
+    keys = []
+    for part in location[:-1]:
+        if isinstance(part, int) or (isinstance(values, dict) and part in values):
+            keys.append(str(part))
+            values = values[part]
+    return [*keys, str(location[-1])]

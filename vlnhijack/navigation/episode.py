@@ -1,16 +1,23 @@
-"""Episodes in the form of the Room-to-Room data set."""
+"""Episodes, read from the files of Room-to-Room, Room-for-Room and Room-across-Room."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
-
-from vlnhijack.artifacts import read_json, write_json
+from vlnhijack.artifacts import write_json
 from vlnhijack.errors import InputError
+from vlnhijack.navigation.annotations import (
+    PathRecord,
+    R2RRecord,
+    RxRRecord,
+    r2r_records,
+    rxr_records,
+)
 from vlnhijack.navigation.graph import NavigationGraph
+
+_MANY = 8
 
 
 @dataclass(frozen=True)
@@ -19,7 +26,7 @@ class Episode:
 
     path: viewpoint ids of the scan, start to goal; heading: where the agent looks at the start,
     radians; distance: length of the path in metres; instruction_id: `<path_id>_<number>`, as HAMT
-    names it.
+    names it; encoding: token ids of the instruction where the file holds them (HAMT's `_enc`).
     """
 
     path_id: int
@@ -29,36 +36,31 @@ class Episode:
     instruction: str
     instruction_id: str
     distance: float
+    encoding: tuple[int, ...] | None = None
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(strict=True)
-    path_id: int
-    scan: str
-    path: Annotated[list[str], Field(min_length=1)]
-    heading: Annotated[float, Field(allow_inf_nan=False)]
-    distance: Annotated[float, Field(allow_inf_nan=False, ge=0)]
-    instructions: Annotated[list[Annotated[str, Field(pattern=r"\S")]], Field(min_length=1)]
+def load_episodes(
+    file: Path, graphs: Mapping[str, NavigationGraph], languages: Sequence[str] = ()
+) -> list[Episode]:
+    """All episodes of a file; see `stream_episodes`."""
+    return list(stream_episodes(file, graphs, languages))
 
 
-def load_episodes(file: Path, graphs: Mapping[str, NavigationGraph]) -> list[Episode]:
-    """The episodes of an R2R JSON file, one per instruction, in the file's order.
+def stream_episodes(
+    file: Path, graphs: Mapping[str, NavigationGraph], languages: Sequence[str] = ()
+) -> Iterator[Episode]:
+    """The episodes of an annotation file, one per instruction, in the file's order.
 
-    Raises InputError with file, record and field for wrong types, a scan without a graph, unknown
-    viewpoints, steps between viewpoints that are not adjacent, and repeated path ids.
+    `.json` holds R2R or R4R records, `.jsonl` RxR guide annotations, of which those in `languages`
+    ("en", "hi-IN", …; all without) are taken; both may be gzipped (`.gz`) and hold HAMT's token
+    ids. Records are read one at a time. Raises InputError with file, record and field for wrong
+    types, a scan without a graph, unknown viewpoints, steps between viewpoints that are not
+    adjacent, and repeated ids.
     """
-    episodes: list[Episode] = []
-    known: set[tuple[str, int]] = set()
-    for number, record in enumerate(_records(file)):
-        where = f"record {number} (path_id {record.path_id})"
-        if (record.scan, record.path_id) in known:
-            raise InputError(
-                file=file, field=f"{where}: path_id", expected="one record", received="two"
-            )
-        known.add((record.scan, record.path_id))
-        _check_path(file, where, record, graphs)
-        episodes += _episodes_of(record)
-    return episodes
+    if ".jsonl" in file.suffixes[-2:]:
+        yield from _rxr_episodes(file, graphs, languages)
+    else:
+        yield from _r2r_episodes(file, graphs)
 
 
 def save_episodes(file: Path, episodes: Iterable[Episode]) -> None:
@@ -77,29 +79,77 @@ def save_episodes(file: Path, episodes: Iterable[Episode]) -> None:
             },
         )
         record["instructions"].append(episode.instruction)
+        if episode.encoding is not None:
+            record.setdefault("instr_encodings", []).append(list(episode.encoding))
     write_json(file, list(records.values()))
 
 
-def _records(file: Path) -> list[_Record]:
-    try:
-        return TypeAdapter(list[_Record]).validate_python(read_json(file))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = [f"record {part}" if isinstance(part, int) else part for part in first["loc"][:1]]
-        field = ": ".join([*where, ".".join(map(str, first["loc"][1:]))]).rstrip(": ")
-        raise InputError(
-            file=file, field=field or None, expected=first["msg"], received=first["input"]
-        ) from None
+def _r2r_episodes(file: Path, graphs: Mapping[str, NavigationGraph]) -> Iterator[Episode]:
+    known: set[tuple[str, int]] = set()
+    for where, record in r2r_records(file):
+        _check_new(file, f"{where}: path_id", (record.scan, record.path_id), known)
+        _check_path(file, where, record, graphs)
+        for number, text in enumerate(record.instructions):
+            encoding = record.instr_encodings[number] if record.instr_encodings else None
+            yield _episode(record, text, number, record.distance, encoding)
+
+
+def _rxr_episodes(
+    file: Path, graphs: Mapping[str, NavigationGraph], languages: Sequence[str]
+) -> Iterator[Episode]:
+    known: set[int] = set()
+    paths: dict[int, tuple[str, list[str]]] = {}
+    for where, record in rxr_records(file, languages):
+        _check_new(file, f"{where}: instruction_id", record.instruction_id, known)
+        _check_path(file, where, record, graphs)
+        path = (record.scan, record.path)
+        if paths.setdefault(record.path_id, path) != path:
+            raise InputError(
+                file=file,
+                field=f"{where}: path",
+                expected=f"one path with path_id {record.path_id}",
+                received="another",
+            )
+        length = graphs[record.scan].length(record.path)
+        yield _episode(
+            record, record.instruction, record.instruction_id, length, record.instr_encoding
+        )
+
+
+def _episode(
+    record: R2RRecord | RxRRecord,
+    instruction: str,
+    number: int,
+    distance: float,
+    encoding: list[int] | None,
+) -> Episode:
+    return Episode(
+        record.path_id,
+        record.scan,
+        tuple(record.path),
+        record.heading,
+        instruction,
+        f"{record.path_id}_{number}",
+        distance,
+        None if encoding is None else tuple(encoding),
+    )
+
+
+def _check_new(file: Path, field: str, key: Any, known: set[Any]) -> None:
+    if key in known:
+        raise InputError(file=file, field=field, expected="one record", received="two")
+    known.add(key)
 
 
 def _check_path(
-    file: Path, where: str, record: _Record, graphs: Mapping[str, NavigationGraph]
+    file: Path, where: str, record: PathRecord, graphs: Mapping[str, NavigationGraph]
 ) -> None:
     if record.scan not in graphs:
+        names = sorted(graphs)
         raise InputError(
             file=file,
             field=f"{where}: scan",
-            expected=f"one of {', '.join(sorted(graphs))}",
+            expected=f"one of {', '.join(names)}" if len(names) <= _MANY else "a scan with a graph",
             received=record.scan,
         )
     graph = graphs[record.scan]
@@ -119,18 +169,3 @@ def _check_path(
                 expected=f"a neighbour of {here}",
                 received=there,
             )
-
-
-def _episodes_of(record: _Record) -> list[Episode]:
-    return [
-        Episode(
-            record.path_id,
-            record.scan,
-            tuple(record.path),
-            record.heading,
-            instruction,
-            f"{record.path_id}_{number}",
-            record.distance,
-        )
-        for number, instruction in enumerate(record.instructions)
-    ]

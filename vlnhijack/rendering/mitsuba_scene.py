@@ -37,7 +37,8 @@ def build_scene(house: House) -> MitsubaScene:
     """The scene of a house: baked surfaces glow as they look, lit ones are diffuse.
 
     Baked textures are `raw` radiance. Lit textures are handed over as linear albedo, because
-    Mitsuba decodes sRGB only when it reads a file.
+    Mitsuba decodes sRGB only when it reads a file. It is loaded by one thread: parallel loading can
+    deadlock with Python's interpreter lock (Mitsuba issue 1649, Dr.Jit issue 524).
     """
     mi = activate()
     content: dict[str, Any] = {"type": "scene"}
@@ -45,7 +46,7 @@ def build_scene(house: House) -> MitsubaScene:
         content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind)
     for index, light in enumerate(house.lights if house.kind == "lit" else ()):
         content[f"light_{index}"] = _light(light)
-    scene = mi.load_dict(content)
+    scene = mi.load_dict(content, parallel=False)
     return MitsubaScene(scene, _surface_of_shape(scene))
 
 

@@ -49,7 +49,8 @@ def views_sensor(cameras: Sequence[Camera], spp: int) -> Any:
         "sample_border": False,
     }
     sampler = {"type": SAMPLER, "sample_count": spp}
-    sensor = mi.load_dict({"type": "vlnhijack_views", "film": film, "sampler": sampler})
+    content = {"type": "vlnhijack_views", "film": film, "sampler": sampler}
+    sensor = mi.load_dict(content, parallel=False)
     sensor.aim(cameras)
     return sensor
 

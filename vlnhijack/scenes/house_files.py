@@ -18,10 +18,17 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from vlnhijack import display
-from vlnhijack.artifacts import atomic_folder, read_json, sha256, write_json, write_text
+from vlnhijack.artifacts import (
+    atomic_folder,
+    read_json,
+    sha256,
+    validated,
+    write_json,
+    write_text,
+)
 from vlnhijack.errors import InputError
 from vlnhijack.navigation.graph import load_graph, save_graph
 from vlnhijack.scenes.gltf import save_glb
@@ -94,12 +101,12 @@ def load_house(folder: Path) -> House:
     Raises InputError that names the file and field where anything is missing, corrupt or
     inconsistent, or lies outside the folder.
     """
-    entry = _parse(_HOUSE, folder / "house.json")
+    entry = _read(_HOUSE, folder / "house.json")
     house = House(
         name=entry.name,
         kind=entry.kind,
         surfaces=tuple(_load_surface(folder, surface, entry.sha256) for surface in entry.surfaces),
-        objects=_parse(_OBJECTS, folder / "objects.json"),
+        objects=_read(_OBJECTS, folder / "objects.json"),
         rooms=entry.rooms,
         graph=load_graph(folder, entry.name),
         lights=entry.lights,
@@ -144,15 +151,8 @@ def _entry(house: House, hashes: dict[str, str]) -> _HouseFile:
     )
 
 
-def _parse(form: TypeAdapter[T], path: Path) -> T:
-    try:
-        return form.validate_python(read_json(path))
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"])) or None
-        raise InputError(
-            file=path, field=field, expected=first["msg"], received=first["input"]
-        ) from None
+def _read(form: TypeAdapter[T], path: Path) -> T:
+    return validated(form, read_json(path), path)
 
 
 def _load_surface(folder: Path, entry: _SurfaceEntry, hashes: dict[str, str]) -> Surface:

@@ -5,6 +5,7 @@ import torch
 from tests.hamt_by_hand import Step
 from tests.worlds import World, world
 from vlnhijack.agents.observation import VIEWS, gather_views, observation_table
+from vlnhijack.errors import InputError
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.navigation.views import angle_features
 
@@ -79,3 +80,11 @@ def test_gradients_reach_the_gathered_views_only(given: World) -> None:
     expected[2, 3] = 2
     assert features.grad is not None
     assert torch.equal(features.grad, expected)
+
+
+def test_a_step_to_no_neighbour_is_refused(given: World) -> None:
+    scan, viewpoint = next(iter(given.table.index))
+    graph = given.table.graphs[scan]
+    far = next(v for v in graph.viewpoints if v not in {viewpoint, *graph.neighbours(viewpoint)})
+    with pytest.raises(InputError, match=f"a neighbour of {viewpoint}, received '?{far}"):
+        given.table.actions(torch.tensor([0]), torch.tensor([given.table.index[scan, far]]))

@@ -8,7 +8,9 @@ from vlnhijack.agents.rollout import rows_of
 from vlnhijack.agents.trajectory import (
     MAX_WORDS,
     Trajectories,
+    history,
     read_instructions,
+    renew_history,
     step_logits,
     trajectories,
 )
@@ -45,7 +47,8 @@ def batched(given: World, episodes: list[Episode], features: torch.Tensor) -> to
     read = read_instructions(given.agent.policy, given.agent.vocabulary, episodes)
     walked = walk(given, episodes)
     rows, steps = every_step(walked)
-    return step_logits(given.agent.policy, given.table, features, read, walked, rows, steps)
+    past = history(given.agent.policy, given.table, features, walked)
+    return step_logits(given.agent.policy, given.table, features, past, read, walked, rows, steps)
 
 
 def test_all_steps_at_once_are_the_steps_one_by_one(given: World) -> None:
@@ -89,9 +92,9 @@ def gradient_of_last_step(given: World, episode: Episode) -> torch.Tensor:
     read = read_instructions(given.agent.policy, given.agent.vocabulary, [episode])
     walked = walk(given, [episode])
     last = walked.lengths - 1
-    logits = step_logits(
-        given.agent.policy, given.table, features, read, walked, torch.tensor([0]), last
-    )
+    policy, first = given.agent.policy, torch.tensor([0])
+    past = history(policy, given.table, features, walked)
+    logits = step_logits(policy, given.table, features, past, read, walked, first, last)
     stop = given.table.stops[walked.viewpoints[0, last]]
     logits[0, stop].sum().backward()
     assert features.grad is not None
@@ -120,3 +123,36 @@ def test_gradients_flow_through_observation_and_history(
     without_observation = gradient_of_last_step(given, episode)
     assert without_observation[here] == 0
     assert (without_observation[past] > 0).all()
+
+
+def test_renewing_the_changed_history_is_encoding_it_all(given: World) -> None:
+    episodes = some(given)
+    policy, walked = given.agent.policy, walk(given, [*episodes, *episodes[::2]])
+    changing = torch.zeros(len(given.features), dtype=torch.bool)
+    changing[rows_of(given.table, episodes[0])[1:3]] = True
+    noise = torch.randn(given.features.shape, generator=torch.Generator().manual_seed(0))
+    features = torch.where(changing[:, None, None], given.features + noise, given.features)
+    features.requires_grad_()
+    with torch.no_grad():
+        past = history(policy, given.table, given.features, walked)
+    renewed = renew_history(policy, given.table, features, walked, past, changing)
+    whole = history(policy, given.table, features, walked)
+    taken = torch.arange(whole.shape[1]) < walked.lengths[:, None]
+    torch.testing.assert_close(renewed[taken], whole[taken], rtol=1e-5, atol=1e-6)
+    assert (renewed[taken] - past[taken]).abs().amax() > 0.01
+    weights = (
+        torch.randn(whole.shape, generator=torch.Generator().manual_seed(1)) * taken[..., None]
+    )
+    (fast,) = torch.autograd.grad((renewed * weights).sum(), features)
+    (slow,) = torch.autograd.grad((whole * weights).sum(), features)
+    torch.testing.assert_close(fast[changing], slow[changing], rtol=1e-4, atol=1e-6)
+
+
+def test_history_where_nothing_changes_is_the_old_one(given: World) -> None:
+    walked = walk(given, some(given))
+    past = history(given.agent.policy, given.table, given.features, walked)
+    nowhere = torch.zeros(len(given.features), dtype=torch.bool)
+    assert (
+        renew_history(given.agent.policy, given.table, given.features, walked, past, nowhere)
+        is past
+    )

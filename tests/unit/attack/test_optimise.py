@@ -5,9 +5,9 @@ import torch
 from torch import Tensor
 
 from tests.worlds import VIT, World, world
+from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective, attack_objective
 from vlnhijack.attack.optimise import (
-    AttackedViews,
     AttackSchedule,
     Iteration,
     Validation,
@@ -65,7 +65,7 @@ def problem(given: World, renderer: BlurRenderer) -> tuple[AttackedViews, Object
     row = given.table.index["west", WHERE]
     rows, views = torch.full((SEEN,), row), torch.arange(12, 12 + SEEN)
     seen = AttackedViews(renderer, given.agent.encoder, given.features, rows, views)
-    return seen, attack_objective(given.agent, given.table, attack, through)
+    return seen, attack_objective(given.agent, given.table, attack, through, seen)
 
 
 def attack(given: World, texture: ProjectedAdam, first: int = 0) -> list[Iteration]:

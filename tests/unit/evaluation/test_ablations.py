@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.worlds import World, world
+from vlnhijack.errors import InputError
 from vlnhijack.evaluation.ablations import (
     ablate,
     blank_features,
@@ -37,6 +38,11 @@ def test_a_shuffled_instruction_is_that_of_another_path_of_the_scan(given: World
         assert after.path == before.path
         assert owners[before.scan, after.instruction] - {before.path_id}
     assert len({after.instruction for after in shuffled}) > 10
+
+
+def test_a_single_path_has_no_other_instruction() -> None:
+    with pytest.raises(InputError, match="paths of s: expected two or more"):
+        shuffle_instructions(instructions("Stop.", 1), seed=0)
 
 
 def test_object_and_room_words_change_their_category_and_no_other_word_changes() -> None:

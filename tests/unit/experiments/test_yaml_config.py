@@ -101,12 +101,25 @@ def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
 def test_errors_in_drawn_instances_name_their_key(
     tmp_path: Path, old: str, new: str, field: str
 ) -> None:
-    assert field in message(write(tmp_path, DRAWN.replace(old, new)))
+    found = message(write(tmp_path, DRAWN.replace(old, new)))
+    assert found.startswith(f"a.yaml: instances.{field}")
 
 
 def test_errors_in_picked_instances_name_their_key(tmp_path: Path) -> None:
     text = PICKED.replace("object: sofa_0", "objekt: sofa_0")
-    assert "0.object: expected a value, received 'nothing'" in message(write(tmp_path, text))
+    found = message(write(tmp_path, text))
+    assert found == "a.yaml: instances.0.object: expected a value, received 'nothing'"
+
+
+def test_a_single_step_attack_has_no_target(tmp_path: Path) -> None:
+    found = message(write(tmp_path, PICKED.replace("trajectory", "single_step")))
+    assert found.startswith("a.yaml: instances.0.target: expected no target")
+
+
+def test_a_place_is_picked_once(tmp_path: Path) -> None:
+    twice = PICKED + PICKED.strip().splitlines()[-1].replace("target: b", "target: c")
+    found = message(write(tmp_path, twice))
+    assert found.startswith("a.yaml: instances: expected each kind, house, object and viewpoint")
 
 
 def test_overrides_replace_single_values(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from vlnhijack.agents.trajectory import (
     MAX_WORDS,
     Instructions,
     Trajectories,
+    history,
     step_logits,
     trajectories,
 )
@@ -160,7 +161,8 @@ def _loss(
     read = Instructions(policy.encode_text(ids, mask), mask)
     walked = trajectories(table, paths, headings)
     rows, steps, targets = _labels(table, walked, goals, next_hop)
-    logits = step_logits(policy, table, lessons.features, read, walked, rows, steps)
+    past = history(policy, table, lessons.features, walked)
+    logits = step_logits(policy, table, lessons.features, past, read, walked, rows, steps)
     return smoothed_cross_entropy(logits, targets, schedule.smoothing)
 
 

@@ -1,5 +1,6 @@
 """Episodes for a procedural house: shortest paths, three instructions each, two splits."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -24,19 +25,23 @@ Path = tuple[str, ...]
 
 
 def make_episodes(
-    house: House, seed: int, train_paths: int = 450, val_paths: int = 60
+    house: House, seed: int, train_paths: int = 450, val_paths: int = 40
 ) -> tuple[list[Episode], list[Episode]]:
     """Episodes of the splits train and val_seen, three per path.
 
     Paths are shortest paths of four to seven viewpoints and at least 5 m that end near a landmark.
-    The val_seen paths are drawn evenly; a path of which one of them is a part is not used at all.
-    A small graph gives fewer paths, in proportion.
+    A path of which a val_seen path is a part is not used at all; so val_seen paths are drawn with
+    chances that fall with the root of the number of paths they are part of. A small graph gives
+    fewer paths, in proportion.
     """
     landmarks = find_landmarks(house)
     paths = [p for p in _shortest_paths(house.graph) if stop_facts(landmarks, p)]
     rng = seeds.stream(seed, "episodes", house.name)
     val_paths = min(val_paths, len(paths) * val_paths // (train_paths + val_paths))
-    held_out = {paths[row] for row in rng.choice(len(paths), val_paths, replace=False)}
+    whole = Counter(part for path in paths for part in _parts(path))
+    chances = np.array([whole[path] ** -0.5 for path in paths])
+    drawn = rng.choice(len(paths), val_paths, replace=False, p=chances / chances.sum())
+    held_out = {paths[row] for row in drawn}
     free = [path for path in paths if not held_out & set(_parts(path))]
     train = _spread(free, min(train_paths, len(free)), rng)
     first = 1000 * (seeds.integer(0, "path_id", house.name) % 1_000_000)
