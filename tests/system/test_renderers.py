@@ -11,7 +11,6 @@ from torch import Tensor
 from tests.houses import tiny_house
 from vlnhijack.errors import InputError
 from vlnhijack.frames import Camera, heading_of
-from vlnhijack.rendering import samples
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.observe import render_views
@@ -86,13 +85,6 @@ def test_images_equal_the_views_of_a_house_with_that_texture(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", RENDERERS)
-def test_images_are_affine_in_the_texture(kind: str) -> None:
-    renderer, a, b = _renderer(kind), _texture(1), _texture(2)
-    middle = renderer((a + b) / 2)
-    torch.testing.assert_close(middle, (renderer(a) + renderer(b)) / 2, atol=1e-5, rtol=0)
-
-
-@pytest.mark.parametrize("kind", RENDERERS)
 def test_the_gradient_predicts_a_change_of_the_image(kind: str) -> None:
     """Exact for frozen; Mitsuba's gradient uses other rays than its image."""
     renderer = _renderer(kind)
@@ -125,28 +117,9 @@ def test_other_samples_differ_no_more_than_two_mitsuba_seeds_do() -> None:
     assert 1 - across <= 1.1 * (1 - between)
 
 
-def test_frozen_is_bit_identical() -> None:
-    first, second = (FrozenRenderer(tiny_house(), OBJECT, _cameras(), SPP, 3) for _ in range(2))
-    assert torch.equal(first(_texture()), second(_texture()))
-    assert torch.equal(_gradient(first), _gradient(second))
-    assert not torch.equal(first(_texture()), _renderer("frozen")(_texture()))
-
-
 def test_frozen_refuses_lit_houses() -> None:
     with pytest.raises(InputError, match="kind: expected baked"):
         FrozenRenderer(tiny_house("lit"), OBJECT, _cameras())
-
-
-@pytest.mark.parametrize("kind", RENDERERS)
-def test_runs_of_cameras_give_the_images_of_one_run(
-    kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Three cameras in wavefronts of two: each view shows its own camera, the filling is cut."""
-    monkeypatch.setattr(samples, "RAYS_AT_ONCE", 2 * 64 * 48 * 64)
-    views = RENDERERS[kind](tiny_house(), OBJECT, _cameras()[:3], 64, 5)(_texture())
-    assert views.shape == (3, 3, 48, 64)
-    whole = _renderer(kind)(_texture())[:3]
-    assert float((views - whole).abs().mean()) < 0.01
 
 
 def test_a_lit_house_gives_gradients_through_light_and_display() -> None:

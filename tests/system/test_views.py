@@ -78,18 +78,6 @@ def test_runs_of_cameras_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> No
     assert float((parts - whole.roll(1, 0)).abs().mean()) > 0.05
 
 
-def test_coverage_is_the_row_sum_of_the_frozen_operator() -> None:
-    house, cameras = tiny_house(), _towards((0.0, 0.0, 0.45))
-    coverage = object_coverage(house, cameras, spp=16, seed=3)
-    assert coverage.shape == (4, 2)
-    for index, item in enumerate(house.objects):
-        transport = FrozenRenderer(house, item.id, cameras, 16, 3).transport
-        ones = torch.ones(transport.texture_shape)
-        rows = transport(ones)[:, 0].view(4, -1).mean(1)
-        np.testing.assert_allclose(coverage[:, index], rows.numpy(), atol=1e-5)
-    assert coverage[:, 0].min() > 0.1
-
-
 def test_the_inside_of_an_object_is_no_part_of_it() -> None:
     """Area emitters are one-sided: a camera in the cabinet sees black, not its texture."""
     house, inside = tiny_house(), [Camera((0.0, 0.0, 0.45), 0.3, 0.0, 16, 12)]

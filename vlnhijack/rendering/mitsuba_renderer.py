@@ -9,7 +9,7 @@ from torch import Tensor
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.display_transform import decode, encode
 from vlnhijack.rendering.filters import Filters
-from vlnhijack.rendering.mitsuba_scene import build_scene, texture_key
+from vlnhijack.rendering.mitsuba_scene import bitmap_shape, build_scene, texture_key
 from vlnhijack.rendering.observe import LIT_DEPTH
 from vlnhijack.rendering.renderer import require_texture
 from vlnhijack.rendering.samples import border_of, image_size, runs, views_sensor
@@ -61,6 +61,7 @@ class MitsubaRenderer:
         require_texture(texture, self.texture_shape)
         values = texture.to(torch_device())
         values = values if self._exposure is None else decode(values)
+        values = values.expand(bitmap_shape(self.texture_shape))
         films = [
             self._render(values, sensor, run.seed, self._gradient_seed(run.first))
             for sensor, run in zip(

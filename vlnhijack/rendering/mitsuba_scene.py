@@ -71,18 +71,16 @@ def texture_key(house: House, object_id: str) -> str:
 
 def set_texture(built: MitsubaScene, house: House, object_id: str, values: NDArray) -> None:
     """Give an object another texture (H,W,3) of the same shape: radiance, or linear albedo."""
-    mi = activate()
-    params = mi.traverse(built.scene)
-    params[texture_key(house, object_id)] = mi.TensorXf(np.ascontiguousarray(values, np.float32))
+    params = activate().traverse(built.scene)
+    params[texture_key(house, object_id)] = _bitmap_data(values)
     params.update()
 
 
 def set_textures(built: MitsubaScene, textures: Sequence[NDArray[np.float32]]) -> None:
     """Give every surface of a baked scene another texture (H,W,3), of the same shape."""
-    mi = activate()
-    params = mi.traverse(built.scene)
+    params = activate().traverse(built.scene)
     for index, texture in enumerate(textures):
-        params[f"surface_{index}.emitter.radiance.data"] = mi.TensorXf(texture)
+        params[f"surface_{index}.emitter.radiance.data"] = _bitmap_data(texture)
     params.update()
 
 
@@ -90,12 +88,23 @@ def bitmap(texture: NDArray[np.float32], filters: Filters) -> dict[str, Any]:
     """A differentiable float texture."""
     return {
         "type": "bitmap",
-        "data": activate().TensorXf(np.ascontiguousarray(texture, np.float32)),
+        "data": _bitmap_data(texture),
         "format": "variant",
         "raw": True,
         "filter_type": filters.lookup,
         "wrap_mode": filters.wrap,
     }
+
+
+def bitmap_shape(texture_shape: Sequence[int]) -> tuple[int, int, int]:
+    """The shape to broadcast a texture (H,W,3) to: Mitsuba's bitmaps have two texels a side."""
+    height, width, channels = texture_shape
+    return max(height, 2), max(width, 2), channels
+
+
+def _bitmap_data(texture: NDArray[np.float32]) -> Any:
+    whole = np.broadcast_to(texture, bitmap_shape(texture.shape))
+    return activate().TensorXf(np.ascontiguousarray(whole, np.float32))
 
 
 def _mesh(name: str, surface: Surface, kind: str, filters: Filters) -> Any:
