@@ -83,7 +83,7 @@ class Twin:
 
 def trace(house: House, cameras: Sequence[Camera], spp: int, seed: int) -> Hits:
     """First hits of the rays that `render_views` draws in one wavefront, by Möller–Trumbore."""
-    ray, _ = camera_rays(views_sensor(cameras, spp), seed, spp)
+    ray = camera_rays(views_sensor(cameras, spp), seed, spp).ray
     origin, direction = (np.array(x, np.float64).T for x in (ray.o, ray.d))
     corners = np.concatenate([s.vertices[s.faces] for s in house.surfaces]).astype(np.float64)
     uv = np.concatenate([s.uv[s.faces] for s in house.surfaces]).astype(np.float64)
