@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from vlnhijack.experiments.yaml_config import Settings
+from vlnhijack.experiments.yaml_config import Settings, SquareInt
 
 CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
 Kind = Literal["single_step", "trajectory"]
@@ -104,8 +104,8 @@ class RenderSettings(Settings):
     """Renderer of the attack, and samples per pixel of the attack, validation and evaluation."""
 
     rung: Literal["frozen", "mitsuba"] = "frozen"
-    attack_spp: PositiveInt = 16
-    evaluation_spp: PositiveInt = 16
+    attack_spp: SquareInt = 16
+    evaluation_spp: SquareInt = 16
 
 
 class AttackSettings(Settings):
