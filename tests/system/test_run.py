@@ -95,3 +95,4 @@ def test_bad_settings_end_in_one_line(tmp_path: Path, setting: str, names: list[
     assert done.returncode == 1
     assert len(done.stderr.strip().splitlines()) == 1
     assert all(name in done.stderr for name in names)
+    assert not (tmp_path / "bad").exists()

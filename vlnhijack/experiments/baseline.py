@@ -14,6 +14,7 @@ from vlnhijack.evaluation.evaluate import navigate
 from vlnhijack.evaluation.gate import check_baseline
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.views import encode_house
+from vlnhijack.settings import house_folder
 
 
 def clean_features(context: Context, scan: str) -> Tensor:
@@ -21,6 +22,7 @@ def clean_features(context: Context, scan: str) -> Tensor:
     house, encoder = context.houses[scan], context.agent.encoder
     spp = context.config.rendering.evaluation_spp
     seed = context.seed("views", "evaluation", scan)
+    house_hash = sha256(house_folder(scan) / "house.json")
 
     def encode() -> Features:
         task = context.progress.add_task(
@@ -34,7 +36,7 @@ def clean_features(context: Context, scan: str) -> Tensor:
         house.graph,
         encoder.feature_size,
         encoder.image_size,
-        f"agent {sha256(context.agent.path)}, {spp} spp, seed {seed}",
+        f"agent {sha256(context.agent.path)}, house {house_hash}, {spp} spp, seed {seed}",
         encode,
     )
     return torch.from_numpy(features)

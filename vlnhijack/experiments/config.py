@@ -13,7 +13,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from vlnhijack.experiments.yaml_config import Settings
+from vlnhijack.experiments.yaml_config import Settings, SquareInt
 
 CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
 Kind = Literal["single_step", "trajectory"]
@@ -117,8 +117,8 @@ class RenderSettings(Settings):
     """
 
     rung: Literal["frozen", "fixed-illumination", "prb"] = "frozen"
-    attack_spp: PositiveInt = 16
-    evaluation_spp: PositiveInt = 16
+    attack_spp: SquareInt = 16
+    evaluation_spp: SquareInt = 16
     refresh_every: NonNegativeInt = 0
     max_memory: PositiveFloat = 512
 

@@ -9,7 +9,7 @@ from vlnhijack import seeds
 from vlnhijack.navigation.episode import Episode, save_episodes
 from vlnhijack.rendering.bake import bake
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import save_house
+from vlnhijack.scenes.house_files import check_name, save_house
 from vlnhijack.scenes.procedural.episodes import make_episodes, viewpoint_overlap
 from vlnhijack.scenes.procedural.house_maker import make_house
 
@@ -29,6 +29,7 @@ def make_house_folder(
     lit keeps the lights; otherwise `spp` light paths per texel are baked into the textures. unseen
     houses get all their episodes as val_unseen, others as train and val_seen.
     """
+    check_name(name, folder)
     task = progress.add_task(f"{name}: geometry", total=3)
     started = time.perf_counter()
     house = make_house(name, seed)

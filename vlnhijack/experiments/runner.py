@@ -40,10 +40,10 @@ def run(
     Raises InputError where the folder holds a run that may not be continued, CheckError where the
     baseline gate or an apply check fails.
     """
-    open_folder(config, folder, resume=resume)
     make_repeatable(config.threads)
     context = load_context(config, folder, progress)
     instances = make_instances(context)
+    open_folder(config, folder, resume=resume)
     write_json(folder / "instances.json", [asdict(instance) for instance in instances])
     seconds = {"baseline": sum(baseline(context, scan) for scan in used_scans(instances))}
     seconds |= {"attack": 0.0, "evaluation": 0.0}
@@ -73,13 +73,22 @@ def open_folder(config: ExperimentConfig, folder: Path, *, resume: bool) -> None
     if saved.exists():
         if not resume:
             raise InputError(file=folder, expected="no earlier run (or --resume)", received="one")
-        if load_config(saved, ExperimentConfig) != config:
-            raise InputError(file=saved, expected="the settings of this run", received="others")
+        check_same_settings(saved, config)
         return
     if folder.exists() and any(folder.iterdir()):
         raise InputError(file=folder, expected="an empty or new folder", received="other files")
     save_config(saved, config)
     write_json(folder / "environment.json", environment(config))
+
+
+def check_same_settings(saved: Path, config: ExperimentConfig) -> None:
+    """Raises InputError that names the first setting in which `config` differs from a saved one."""
+    here, there = (
+        each.model_dump(mode="json") for each in (load_config(saved, ExperimentConfig), config)
+    )
+    for key in here:
+        if here[key] != there[key]:
+            raise InputError(file=saved, field=key, expected=here[key], received=there[key])
 
 
 def environment(config: ExperimentConfig) -> dict[str, Any]:

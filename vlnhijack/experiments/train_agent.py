@@ -27,7 +27,7 @@ from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.artifacts import append_row, read_json, write_bytes, write_json
 from vlnhijack.evaluation.ablations import ablate, blank_features, rates
 from vlnhijack.experiments.views import view_targets
-from vlnhijack.experiments.yaml_config import Settings, save_config
+from vlnhijack.experiments.yaml_config import Settings, SquareInt, save_config
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
@@ -45,7 +45,7 @@ class ViewSize(Settings):
 
     width: int = 128
     height: int = 96
-    spp: int = 16
+    spp: SquareInt = 16
 
 
 class AgentConfig(Settings):

@@ -1,14 +1,25 @@
 """YAML files checked against pydantic models: unknown keys and wrong types are errors."""
 
 from collections.abc import Sequence
+from math import isqrt
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, PositiveInt, ValidationError
+from pydantic_core import PydanticCustomError
 
 from vlnhijack.artifacts import write_text
 from vlnhijack.errors import InputError
+
+
+def _square(value: int) -> int:
+    if isqrt(value) ** 2 != value:
+        raise PydanticCustomError("square", "a square number")
+    return value
+
+
+SquareInt = Annotated[PositiveInt, AfterValidator(_square)]
 
 
 class Settings(BaseModel):

@@ -68,6 +68,14 @@ _OBJECTS: TypeAdapter[tuple[HouseObject, ...]] = TypeAdapter(
 )
 
 
+def check_name(name: str, file: Path) -> None:
+    """InputError where a name cannot be that of a house or surface: it becomes a file's."""
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            file=file, field="name", expected="letters, digits, _ and -", received=name
+        )
+
+
 def save_house(
     house: House, folder: Path, episodes: Mapping[str, list[dict[str, Any]]] | None = None
 ) -> None:
@@ -190,10 +198,10 @@ def _check(house: House, folder: Path) -> None:
     objects = sorted(o.id for o in house.objects)
     rooms = {room.id for room in house.rooms}
     strangers = sorted({o.room for o in house.objects} - rooms)
-    unfit = [name for name in (house.name, *names) if not _NAME.fullmatch(name)]
+    for name in (house.name, *names):
+        check_name(name, folder)
     for wrong, field, expected, received in (
         (not names, "surfaces", "≥ 1 surface", 0),
-        (unfit, "name", "letters, digits, _ and -", unfit),
         (len(set(names)) < len(names), "surfaces", "distinct names", _repeated(names)),
         (owners != objects, "objects", f"one surface for each of {objects}", owners),
         (strangers, "objects", f"rooms among {sorted(rooms)}", strangers),

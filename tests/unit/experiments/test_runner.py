@@ -46,7 +46,7 @@ def test_resuming_nothing_starts_anew(tmp_path: Path) -> None:
 def test_a_run_with_other_settings_is_not_continued(tmp_path: Path) -> None:
     open_folder(CONFIG, tmp_path / "a", resume=False)
     changed = CONFIG.model_copy(update={"seed": 6})
-    with pytest.raises(InputError, match=r"config\.yaml: expected the settings of this run"):
+    with pytest.raises(InputError, match=r"config\.yaml: seed: expected 5, received 6"):
         open_folder(changed, tmp_path / "a", resume=True)
 
 

@@ -60,6 +60,7 @@ def test_a_saved_config_is_the_same(tmp_path: Path, text: str) -> None:
         ("rendering: {sp: 2}", "a.yaml: rendering.sp: expected no such key, received 2"),
         ("seed: one", "a.yaml: seed: expected a valid integer"),
         ("threads: 0", "a.yaml: threads: expected greater than 0, received 0"),
+        ("rendering: {attack_spp: 3}", "a.yaml: rendering.attack_spp: expected a square number, r"),
         ("rendering: 3", "a.yaml: rendering: expected a valid dictionary"),
         ("rules: {min_paths: 1}", "a.yaml: rules.min_paths: expected greater than or equal to 2"),
         ("rules: {validation: 0}", "a.yaml: rules.validation: expected greater than 0, received 0"),

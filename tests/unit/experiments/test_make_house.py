@@ -1,0 +1,17 @@
+from pathlib import Path
+
+import pytest
+from rich.progress import Progress
+
+from vlnhijack.errors import InputError
+from vlnhijack.experiments.make_house import make_house_folder
+
+
+def test_a_bad_name_is_refused_before_any_work(tmp_path: Path) -> None:
+    progress = Progress(disable=True)
+    with pytest.raises(InputError, match="name: expected letters, digits, _ and -"):
+        make_house_folder(
+            "a b", 1, tmp_path / "a", lit=True, spp=1, unseen=False, progress=progress
+        )
+    assert not progress.tasks
+    assert not list(tmp_path.iterdir())
