@@ -7,7 +7,7 @@ from vlnhijack.errors import InputError
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.renderer import Renderer, require_texture
 from vlnhijack.rendering.samples import image_size
-from vlnhijack.rendering.transport import Transport, csr_of_entries, transposed
+from vlnhijack.rendering.transport import Transport, csr_of_entries, with_adjoint
 
 
 class FoldedRenderer:
@@ -76,7 +76,7 @@ def _resized(transport: Transport, vertical: Tensor, horizontal: Tensor, scale: 
         product.values()[order],
         (views * resized, texels),
     )
-    return Transport(forward, transposed(forward), transport.texture_shape)
+    return with_adjoint(forward, transport.texture_shape)
 
 
 def _kronecker(vertical: Tensor, horizontal: Tensor) -> Tensor:

@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
+from torch.nn.functional import embedding_bag
 
 from vlnhijack.rendering.entries import Entries, background, entries
 from vlnhijack.rendering.filters import Filters
@@ -22,19 +23,16 @@ from vlnhijack.rendering.trace import Samples
 class Transport:
     """A in both directions, between T = H·W texels and P pixels.
 
-    forward (P,T) and adjoint (T,P) are CSR tensors with int32 indices. Where light is coloured they
-    are (3P,3T) and (3T,3P), channel after channel of a pixel and of a texel, and channels is 3.
+    forward (P,T) and adjoint (C,P) are CSR tensors with int32 indices; the rows of adjoint are the
+    texels (C,) that weigh on any pixel, ascending. Where light is coloured they are (3P,3T) and
+    (3C,3P), channel after channel of a pixel and of a texel, and channels is 3.
     """
 
     forward: Tensor
     adjoint: Tensor
+    texels: Tensor
     texture_shape: tuple[int, int, int]
     channels: int = 1
-
-    @property
-    def texels(self) -> Tensor:
-        """The texels (C,) that weigh on any pixel, ascending."""
-        return torch.unique(self.forward.col_indices() // self.channels)
 
     def __call__(self, texture: Tensor) -> Tensor:
         """Radiance (P,3) of the object with a texture (H,W,3); differentiable once."""
@@ -45,23 +43,33 @@ class Transport:
         """The same matrix with float64 entries, for finite differences."""
         return replace(self, forward=self.forward.double(), adjoint=self.adjoint.double())
 
-    def apply(self, matrix: Tensor, colours: Tensor) -> Tensor:
+    def product(self, matrix: Tensor, colours: Tensor) -> Tensor:
         """forward or adjoint times colours (…,3), as (K,3)."""
-        return (matrix @ colours.reshape(-1, 3 // self.channels)).view(-1, 3)
+        return embedding_bag(
+            matrix.col_indices(),
+            colours.reshape(-1, 3 // self.channels).contiguous(),
+            matrix.crow_indices(),
+            mode="sum",
+            per_sample_weights=matrix.values(),
+            include_last_offset=True,
+        ).view(-1, 3)
 
 
 class _Apply(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, texture: Tensor, transport: Transport) -> Tensor:
         ctx.transport = transport
-        return transport.apply(transport.forward, texture)
+        return transport.product(transport.forward, texture)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, image_gradient: Tensor) -> tuple[Tensor, None]:
         transport = ctx.transport
-        gradient = transport.apply(transport.adjoint, image_gradient)
-        return gradient.view(transport.texture_shape), None
+        gradient = image_gradient.new_zeros(transport.texture_shape)
+        gradient.view(-1, 3)[transport.texels] = transport.product(
+            transport.adjoint, image_gradient
+        )
+        return gradient, None
 
 
 def build(
@@ -90,16 +98,22 @@ def assemble(
     rows, columns = (_by_channel(index, channels) for index in (pixel, texel))
     order = stable_order(rows) if channels > 1 else slice(None)
     forward = csr_of_entries(rows[order], columns[order], values.ravel()[order], shape)
-    return Transport(forward, transposed(forward), texture_shape, channels)
+    return with_adjoint(forward, texture_shape, channels)
 
 
-def transposed(matrix: Tensor) -> Tensor:
-    """The transpose of a CSR matrix as a CSR matrix."""
-    rows = torch.arange(matrix.shape[0], device=matrix.device, dtype=torch.int32)
-    rows = rows.repeat_interleave(matrix.crow_indices().diff())
-    order = stable_order(matrix.col_indices())
-    shape = (matrix.shape[1], matrix.shape[0])
-    return csr_of_entries(matrix.col_indices()[order], rows[order], matrix.values()[order], shape)
+def with_adjoint(
+    forward: Tensor, texture_shape: tuple[int, int, int], channels: int = 1
+) -> Transport:
+    """The operator of a forward matrix."""
+    pixels = torch.arange(forward.shape[0], device=forward.device, dtype=torch.int32)
+    pixels = pixels.repeat_interleave(forward.crow_indices().diff())
+    order = stable_order(forward.col_indices())
+    counts = torch.bincount(forward.col_indices(), minlength=forward.shape[1]).view(-1, channels)
+    (texels,) = counts.sum(1).nonzero(as_tuple=True)
+    starts = _starts(counts[texels].ravel())
+    shape = (len(starts) - 1, forward.shape[0])
+    adjoint = csr(starts, pixels[order], forward.values()[order], shape)
+    return Transport(forward, adjoint, texels.int(), texture_shape, channels)
 
 
 def _by_channel(index: Tensor, channels: int) -> Tensor:
@@ -110,9 +124,14 @@ def _by_channel(index: Tensor, channels: int) -> Tensor:
 
 def csr_of_entries(rows: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, int]) -> Tensor:
     """A CSR matrix of entries sorted by row, then column."""
-    starts = torch.zeros(shape[0] + 1, dtype=torch.int32, device=rows.device)
-    starts[1:] = torch.cumsum(torch.bincount(rows, minlength=shape[0]), 0)
-    return csr(starts, columns, values, shape)
+    return csr(_starts(torch.bincount(rows, minlength=shape[0])), columns, values, shape)
+
+
+def _starts(counts: Tensor) -> Tensor:
+    """Row pointers (K+1,) int32 of rows with so many entries (K,)."""
+    starts = torch.zeros(len(counts) + 1, dtype=torch.int32, device=counts.device)
+    torch.cumsum(counts, 0, out=starts[1:])
+    return starts
 
 
 def csr(starts: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -15,7 +15,7 @@ from vlnhijack.errors import InputError
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.filters import Filters
 from vlnhijack.rendering.samples import RAYS_AT_ONCE, SAMPLER
-from vlnhijack.rendering.transport import Transport, csr, transposed
+from vlnhijack.rendering.transport import Transport, csr, with_adjoint
 from vlnhijack.rendering.variant import torch_device
 from vlnhijack.scenes.house import House
 
@@ -67,7 +67,7 @@ def load_transport(path: Path, key: str) -> tuple[Transport, Tensor]:
         raise InputError(f"not a safetensors file ({error})", file=path) from None
     height, width, colours = json.loads(header["texture"])
     forward = csr(starts, columns, values, (len(rest), height * width))
-    return Transport(forward, transposed(forward), (height, width, colours)), rest
+    return with_adjoint(forward, (height, width, colours)), rest
 
 
 def _require(path: Path, header: dict[str, str], key: str) -> None:
