@@ -8,9 +8,15 @@ import pandas as pd
 
 from vlnhijack import seeds
 
-ARMS = ("clean", "noise", "attacked")
+CONTROLS = ("clean", "noise")
+ATTACKED = "attacked"
 NOISE_ARMS = ("noise_texel", "noise_block")
 CONDITIONS = ("Train", "Validation", "Test")
+_MEASURES = {
+    "single_step": ("stop_rate",),
+    "trajectory": ("sr", "osr", "ndtw"),
+    "original": ("sr", "ndtw"),
+}
 _DRAWS = 2000
 
 Summary = dict[str, Any]
@@ -21,14 +27,23 @@ def summarise(records: pd.DataFrame) -> Summary:
 
     "single_step": {arm: {n, stop_rate}}; "trajectory": {arm: {n, sr, osr, ndtw}} against the
     attack trajectory; "original": {arm: {n, sr, ndtw}} of the same episodes against their own
-    path. Every rate has a `<rate>_ci`, a 95 % bootstrap interval whose clusters are objects, or
-    paths where there is a single object. Of the two noise textures the stronger one counts.
+    path. Where attacks were made with several rungs, each rung is an arm instead of "attacked".
+    Every rate has a `<rate>_ci`, a 95 % bootstrap interval whose clusters are objects, or paths
+    where there is a single object. Of the two noise textures the stronger one counts.
     """
-    chosen = stronger_noise(records)
+    chosen = stronger_noise(name_rungs(records))
     by_condition = {
         condition: _tables(chosen[chosen["condition"] == condition]) for condition in CONDITIONS
     }
     return {**by_condition["Test"], "conditions": by_condition}
+
+
+def name_rungs(records: pd.DataFrame) -> pd.DataFrame:
+    """Where attacks of several rungs are there, each is an arm of its rung's name."""
+    attacked = records["arm"] == ATTACKED
+    if records.loc[attacked, "rung"].nunique() < 2:
+        return records
+    return records.assign(arm=records["arm"].where(~attacked, records["rung"]))
 
 
 def stronger_noise(records: pd.DataFrame) -> pd.DataFrame:
@@ -58,10 +73,9 @@ def _tables(records: pd.DataFrame) -> Summary:
 
 def _by_arm(records: pd.DataFrame, rates: dict[str, str]) -> Summary:
     table: Summary = {}
-    for arm in ARMS:
+    arms = records["arm"].unique()
+    for arm in sorted(arms, key=[*CONTROLS, *arms].index):
         rows = records[records["arm"] == arm]
-        if rows.empty:
-            continue
         table[arm] = {"n": len(rows)}
         for name, column in rates.items():
             table[arm][name] = float(rows[column].mean())
@@ -79,17 +93,20 @@ def interval(records: pd.DataFrame, column: str) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def arms_of(summary: Summary) -> list[str]:
+    """The arms of all tables: clean, noise, and what was attacked."""
+    found = (arm for name in _MEASURES for arm in summary[name])
+    return list(dict.fromkeys([*CONTROLS, *found]))
+
+
 def rows_for_print(summary: Summary) -> Iterable[tuple[str, ...]]:
-    """(table, measure, n, clean, noise, attacked) as text, percent with the interval."""
-    for table, measures in (
-        ("single_step", ("stop_rate",)),
-        ("trajectory", ("sr", "osr", "ndtw")),
-        ("original", ("sr", "ndtw")),
-    ):
+    """(table, measure, n, a cell for each of `arms_of`) as text, percent with the interval."""
+    columns = arms_of(summary)
+    for table, measures in _MEASURES.items():
         arms = summary[table]
         for measure in measures if arms else ():
             n = "/".join(sorted({str(arm["n"]) for arm in arms.values()}))
-            yield (table, measure, n, *(_cell(arms.get(arm), measure) for arm in ARMS))
+            yield (table, measure, n, *(_cell(arms.get(arm), measure) for arm in columns))
 
 
 def _cell(arm: dict[str, Any] | None, measure: str) -> str:

@@ -3,8 +3,6 @@
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -26,11 +24,11 @@ from vlnhijack.attack.optimise import (
     AttackSchedule,
     Iteration,
     Validation,
-    best,
     optimise,
 )
 from vlnhijack.attack.projected_adam import ProjectedAdam
 from vlnhijack.evaluation.evaluate import evaluate_instance
+from vlnhijack.experiments.attacks import Attack
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.rungs import attack_renderer, unbiased_renderer
@@ -45,68 +43,32 @@ from vlnhijack.scenes.uv_atlas import used_texels
 from vlnhijack.threat import AttackInstance, Texture, quantise
 
 
-@dataclass(frozen=True, eq=False)
-class AttackFiles:
-    """The files of one attack in its folder."""
-
-    folder: Path
-
-    @property
-    def result(self) -> Path:
-        return self.folder / "attack.json"
-
-    @property
-    def log(self) -> Path:
-        return self.folder / "log.jsonl"
-
-    @property
-    def validations(self) -> Path:
-        return self.folder / "validation.jsonl"
-
-    @property
-    def house(self) -> Path:
-        return self.folder / "house"
-
-    def state(self, iteration: int) -> Path:
-        return self.folder / "checkpoints" / f"{iteration:05d}.safetensors"
-
-    def last_iteration(self) -> int:
-        """The iteration of the last checkpoint that was validated; 0 without one."""
-        return max((row["iteration"] for row in read_rows(self.validations)), default=0)
-
-    def best(self) -> Validation:
-        """The checkpoint with the highest nDTW on the validation episodes."""
-        rows = read_rows(self.validations)
-        return best([Validation(row["iteration"], row["ndtw"], row["loss"]) for row in rows])
-
-
-def attack(context: Context, instance: AttackInstance) -> float:
-    """Run or finish the attack of an instance; the seconds that its optimisation took."""
-    files = AttackFiles(context.folder / "attacks" / instance.id)
-    if files.result.exists():
-        return float(read_json(files.result)["seconds"])
-    settings = context.config.attack
+def run_attack(context: Context, attack: Attack) -> float:
+    """Run or finish an attack; the seconds that its optimisation took."""
+    if attack.result.exists():
+        return float(read_json(attack.result)["seconds"])
+    settings, instance = context.config.attack, attack.instance
     original = context.houses[instance.scan].surface(instance.object_id).texture
     texture = _texture(context, instance, original)
-    first = files.last_iteration()
-    elapsed = _resume(files, texture, first)
+    first = attack.last_iteration()
+    elapsed = _resume(attack, texture, first)
     started = time.perf_counter() - elapsed
-    task = context.progress.add_task(instance.id, total=settings.iterations, completed=first)
-    for _ in _checkpointed(context, instance, texture, files, first, task, started):
+    task = context.progress.add_task(attack.id, total=settings.iterations, completed=first)
+    for _ in _checkpointed(context, attack, texture, first, task, started):
         pass
-    exported = exported_texture(context, instance)
+    exported = exported_texture(context, attack)
     house = context.houses[instance.scan].with_texture(instance.object_id, exported)
-    save_house(house, files.house)
+    save_house(house, attack.house)
     seconds = time.perf_counter() - started
-    write_json(files.result, {"best": files.best()._asdict(), "seconds": seconds})
+    write_json(attack.result, {"best": attack.best()._asdict(), "seconds": seconds})
     return seconds
 
 
-def exported_texture(context: Context, instance: AttackInstance) -> Texture:
+def exported_texture(context: Context, attack: Attack) -> Texture:
     """The best checkpoint's texture (H,W,3) in 8 bits, inside the ε-ball."""
-    files = AttackFiles(context.folder / "attacks" / instance.id)
+    instance = attack.instance
     original = context.houses[instance.scan].surface(instance.object_id).texture
-    optimised = load_file(files.state(files.best().iteration))["texture"].numpy()
+    optimised = load_file(attack.state(attack.best().iteration))["texture"].numpy()
     return quantise(optimised, original, context.config.attack.epsilon)
 
 
@@ -133,16 +95,25 @@ def object_views(
 
 
 def attacked_views(
-    context: Context, instance: AttackInstance, viewpoints: list[str] | None, stream: str
+    context: Context, attack: Attack, viewpoints: list[str] | None, stream: str
 ) -> AttackedViews:
     """The object's views at the samples of the named stream; without bias but for "attack"."""
-    house, settings = context.houses[instance.scan], context.config.rendering
+    instance = attack.instance
+    house = context.houses[instance.scan]
     rows, views, cameras = object_views(context, instance, viewpoints)
     make = attack_renderer if stream == "attack" else unbiased_renderer
     seed = context.seed("views", stream, instance.id)
-    renderer = make(settings, house, instance.object_id, cameras, seed)
+    renderer = make(attack.rendering, house, instance.object_id, cameras, seed)
     clean = context.place(clean_features(context, instance.scan), instance.scan)
     return AttackedViews(renderer, context.agent.encoder, clean, rows, views)
+
+
+def training(context: Context, attack: Attack) -> tuple[AttackedViews, Objective]:
+    """What an attack optimises: the views that it renders, the loss of its training episodes."""
+    instance = attack.instance
+    near = instance.target_path[: context.config.attack.rendered_viewpoints]
+    views = attacked_views(context, attack, near, "attack")
+    return views, attack_objective(context.agent, context.table, instance, instance.train, views)
 
 
 def _texture(context: Context, instance: AttackInstance, original: np.ndarray) -> ProjectedAdam:
@@ -160,33 +131,30 @@ def _texture(context: Context, instance: AttackInstance, original: np.ndarray) -
 
 def _checkpointed(
     context: Context,
-    instance: AttackInstance,
+    attack: Attack,
     texture: ProjectedAdam,
-    files: AttackFiles,
     first: int,
     task: TaskID,
     started: float,
 ) -> Iterator[Iteration]:
-    settings = context.config.attack
+    settings, instance = context.config.attack, attack.instance
     schedule = AttackSchedule(**settings.model_dump(exclude={"rendered_viewpoints"}))
-    near = instance.target_path[: settings.rendered_viewpoints]
-    views = attacked_views(context, instance, near, "attack")
-    objective = attack_objective(context.agent, context.table, instance, instance.train, views)
-    validation = attacked_views(context, instance, None, "validation")
+    views, objective = training(context, attack)
+    validation = attacked_views(context, attack, None, "validation")
     held_out = attack_objective(
         context.agent, context.table, instance, instance.validation, validation
     )
     seed = context.seed("attack", instance.id)
-    refresh_every = context.config.rendering.refresh_every
+    refresh_every = attack.rendering.refresh_every
     _renew_light(views.renderer, texture, refresh_every, first)
     for row in optimise(texture, views, objective, schedule, seed, first):
-        append_row(files.log, row._asdict())
+        append_row(attack.log, row._asdict())
         context.progress.update(
-            task, completed=row.iteration, description=f"{instance.id}, loss {row.loss:.3f}"
+            task, completed=row.iteration, description=f"{attack.id}, loss {row.loss:.3f}"
         )
         if row.iteration % schedule.checkpoint_every == 0 or row.iteration == schedule.iterations:
             found = _validate(context, instance, validation, held_out, texture, row.iteration)
-            _save_checkpoint(files, texture, found, seed, time.perf_counter() - started)
+            _save_checkpoint(attack, texture, found, seed, time.perf_counter() - started)
         _renew_light(views.renderer, texture, refresh_every, row.iteration)
         yield row
 
@@ -221,23 +189,23 @@ def _validate(
 
 
 def _save_checkpoint(
-    files: AttackFiles, texture: ProjectedAdam, found: Validation, seed: int, seconds: float
+    attack: Attack, texture: ProjectedAdam, found: Validation, seed: int, seconds: float
 ) -> None:
     """Texture, Adam's state, and what the random streams hang on: seed and iteration."""
     streams = {"streams": f"seed {seed}, iteration {found.iteration}"}
-    write_bytes(files.state(found.iteration), save(texture.state(), streams))
-    write_exr(files.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
-    append_row(files.validations, {**found._asdict(), "seconds": seconds})
+    write_bytes(attack.state(found.iteration), save(texture.state(), streams))
+    write_exr(attack.state(found.iteration).with_suffix(".exr"), texture.value.detach().numpy())
+    append_row(attack.validations, {**found._asdict(), "seconds": seconds})
 
 
-def _resume(files: AttackFiles, texture: ProjectedAdam, first: int) -> float:
+def _resume(attack: Attack, texture: ProjectedAdam, first: int) -> float:
     """Load the checkpoint of iteration `first` and forget what came after; seconds spent so far."""
-    files.folder.mkdir(parents=True, exist_ok=True)
-    for path in (files.log, files.validations):
+    attack.folder.mkdir(parents=True, exist_ok=True)
+    for path in (attack.log, attack.validations):
         kept = [row for row in read_rows(path) if row["iteration"] <= first]
         write_text(path, "".join(json.dumps(row) + "\n" for row in kept))
     if first == 0:
         return 0.0
-    texture.load(load_file(files.state(first)))
-    validated = {row["iteration"]: row["seconds"] for row in read_rows(files.validations)}
+    texture.load(load_file(attack.state(first)))
+    validated = {row["iteration"]: row["seconds"] for row in read_rows(attack.validations)}
     return float(validated[first])

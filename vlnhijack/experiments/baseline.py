@@ -20,7 +20,7 @@ from vlnhijack.settings import house_folder
 def clean_features(context: Context, scan: str) -> Tensor:
     """Features (M,36,D) of the clean house, at the samples of the evaluation."""
     house, encoder = context.houses[scan], context.agent.encoder
-    spp = context.config.rendering.evaluation_spp
+    spp = context.config.evaluation_spp
     seed = context.seed("views", "evaluation", scan)
     house_hash = sha256(house_folder(scan) / "house.json")
 

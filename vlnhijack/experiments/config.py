@@ -109,7 +109,7 @@ class DatasetInstances(Settings):
 
 
 class RenderSettings(Settings):
-    """Renderer of the attack, and samples per pixel of the attack, validation and evaluation.
+    """Renderer of an attack, and samples per pixel of the attack, validation and evaluation.
 
     refresh_every is the number of iterations after which `fixed-illumination` renews its light; 0
     keeps that of the original texture. max_memory, in megabytes, bounds what building an operator
@@ -121,6 +121,12 @@ class RenderSettings(Settings):
     evaluation_spp: SquareInt = 16
     refresh_every: NonNegativeInt = 0
     max_memory: PositiveFloat = 512
+
+    @property
+    def name(self) -> str:
+        """What tells attacks apart, such as "frozen_16spp"; with its refreshes where it has any."""
+        refreshed = f"_refresh{self.refresh_every}" if self.refresh_every else ""
+        return f"{self.rung}_{self.attack_spp}spp{refreshed}"
 
 
 class AttackSettings(Settings):
@@ -136,7 +142,10 @@ class AttackSettings(Settings):
 
 
 class ExperimentConfig(Settings):
-    """An experiment: an agent, attacks on it, and how they are made."""
+    """An experiment: an agent, attacks on it, and how they are made.
+
+    rendering: one group, or a list of them; then every instance is attacked once with each.
+    """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
     note: str = ""
@@ -145,7 +154,9 @@ class ExperimentConfig(Settings):
     agent: str = "small"
     instances: list[PickedInstance] | DrawnInstances | StoredInstances
     rules: InstanceRules = InstanceRules()
-    rendering: RenderSettings = RenderSettings()
+    rendering: RenderSettings | Annotated[list[RenderSettings], Field(min_length=1)] = (
+        RenderSettings()
+    )
     attack: AttackSettings = AttackSettings()
 
     @field_validator("instances")
@@ -157,15 +168,36 @@ class ExperimentConfig(Settings):
             raise PydanticCustomError("instances", "each kind, house, object and viewpoint once")
         return instances
 
+    @property
+    def renderings(self) -> list[RenderSettings]:
+        """The groups of `rendering`, at least one."""
+        return self.rendering if isinstance(self.rendering, list) else [self.rendering]
+
+    @property
+    def evaluation_spp(self) -> int:
+        """Samples per pixel of every evaluation, whatever the attack was rendered with."""
+        return self.renderings[0].evaluation_spp
+
+    @model_validator(mode="after")
+    def _comparable(self) -> "ExperimentConfig":
+        """Renderings are told apart by their names, and what they made is evaluated alike."""
+        if len({each.name for each in self.renderings}) < len(self.renderings):
+            raise ValueError("rendering: each rung, attack_spp and refresh_every once")
+        if len({each.evaluation_spp for each in self.renderings}) > 1:
+            raise ValueError("rendering.evaluation_spp must be the same in the whole list")
+        return self
+
     @model_validator(mode="after")
     def _refreshes_at_checkpoints(self) -> "ExperimentConfig":
         """A resumed attack has the light of the whole one only if checkpoints are refreshes."""
-        every, checkpoint = self.rendering.refresh_every, self.attack.checkpoint_every
-        if every and self.rendering.rung != "fixed-illumination":
-            raise ValueError("rendering.refresh_every needs rendering.rung: fixed-illumination")
-        if every and checkpoint % every:
-            raise ValueError(
-                f"attack.checkpoint_every ({checkpoint}) must be a multiple of "
-                f"rendering.refresh_every ({every})"
-            )
+        checkpoint = self.attack.checkpoint_every
+        for rendering in self.renderings:
+            every = rendering.refresh_every
+            if every and rendering.rung != "fixed-illumination":
+                raise ValueError("rendering.refresh_every needs rendering.rung: fixed-illumination")
+            if every and checkpoint % every:
+                raise ValueError(
+                    f"attack.checkpoint_every ({checkpoint}) must be a multiple of "
+                    f"rendering.refresh_every ({every})"
+                )
         return self

@@ -1,8 +1,8 @@
 """Reload the attacked house, check that the texture was applied, evaluate every arm."""
 
 import time
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable
+from functools import lru_cache
 
 import pandas as pd
 import torch
@@ -16,8 +16,10 @@ from vlnhijack.evaluation.apply_check import (
 )
 from vlnhijack.evaluation.controls import noise_textures
 from vlnhijack.evaluation.evaluate import evaluate_instance
-from vlnhijack.evaluation.records import load_records, save_records, to_frame
-from vlnhijack.experiments.attack_stage import AttackFiles, exported_texture, object_views
+from vlnhijack.evaluation.records import Record, load_records, save_records, to_frame
+from vlnhijack.evaluation.tables import ATTACKED
+from vlnhijack.experiments.attack_stage import exported_texture, object_views
+from vlnhijack.experiments.attacks import Attack
 from vlnhijack.experiments.baseline import clean_features
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.rungs import unbiased_renderer
@@ -30,42 +32,33 @@ from vlnhijack.threat import AttackInstance, Texture
 _SEEDS = 8
 
 
-def evaluate(context: Context, instance: AttackInstance) -> tuple[pd.DataFrame, float]:
-    """Records of all arms and conditions of an attacked instance, and the seconds it took."""
-    folder = context.folder / "attacks" / instance.id
-    records_file, report = folder / "records.parquet", folder / "evaluation.json"
+def evaluate(context: Context, attack: Attack) -> tuple[pd.DataFrame, float]:
+    """Records of all arms and conditions of an attack, and the seconds it took."""
+    records_file, report = attack.folder / "records.parquet", attack.folder / "evaluation.json"
     if report.exists():
         return load_records(records_file), float(read_json(report)["seconds"])
     started = time.perf_counter()
-    attacked = load_house(AttackFiles(folder).house)
-    checks = apply_check(context, instance, attacked)
-    conditions = {
-        "Train": instance.train,
-        "Validation": instance.validation,
-        "Test": instance.test,
-    }
-    records = []
-    for arm, features in _arms(context, instance, attacked).items():
-        records += evaluate_instance(
-            context.agent, context.table, features(), instance, arm, conditions
-        )
-    frame = to_frame(records)
+    attacked = load_house(attack.house)
+    checks = apply_check(context, attack, attacked)
+    features = _features(context, attack.instance, attacked)
+    controls = _controls(context, attack.instance)
+    frame = to_frame([*controls, *_records(context, attack.instance, ATTACKED, features)])
     save_records(records_file, frame)
     seconds = time.perf_counter() - started
     write_json(report, {"apply_check": checks, "seconds": seconds})
     return frame, seconds
 
 
-def apply_check(context: Context, instance: AttackInstance, attacked: House) -> dict[str, float]:
+def apply_check(context: Context, attack: Attack, attacked: House) -> dict[str, float]:
     """What was optimised is what lies on disk; raises CheckError where it is not."""
+    instance, settings = attack.instance, attack.rendering
     original = context.houses[instance.scan]
-    texture = exported_texture(context, instance)
+    texture = exported_texture(context, attack)
     epsilon = context.config.attack.epsilon
     excess = check_texels(
         attacked, instance.object_id, texture, original.surface(instance.object_id).texture, epsilon
     )
     _, _, cameras = object_views(context, instance, [instance.viewpoint])
-    settings = context.config.rendering
 
     def rendered(house: House, values: Texture, seed: int) -> Tensor:
         renderer = unbiased_renderer(settings, house, instance.object_id, cameras, seed)
@@ -100,21 +93,31 @@ def apply_check(context: Context, instance: AttackInstance, attacked: House) -> 
     }
 
 
-def _arms(
-    context: Context, instance: AttackInstance, attacked: House
-) -> Mapping[str, Callable[[], Tensor]]:
-    """Features (M,36,D) of each arm, computed when called."""
+@lru_cache(maxsize=1)
+def _controls(context: Context, instance: AttackInstance) -> list[Record]:
+    """Records of the arms without an attack, the same for every attack of the instance."""
     house = context.houses[instance.scan]
     original = house.surface(instance.object_id).texture
     noise = noise_textures(
         original, context.config.attack.epsilon, context.seed("noise", instance.id)
     )
-    arms = {"clean": lambda: context.place(clean_features(context, instance.scan), instance.scan)}
+    clean = context.place(clean_features(context, instance.scan), instance.scan)
+    records = _records(context, instance, "clean", clean)
     for name, texture in noise.items():
         changed = house.with_texture(instance.object_id, texture)
-        arms[name] = partial(_features, context, instance, changed)
-    arms["attacked"] = lambda: _features(context, instance, attacked)
-    return arms
+        records += _records(context, instance, name, _features(context, instance, changed))
+    return records
+
+
+def _records(
+    context: Context, instance: AttackInstance, arm: str, features: Tensor
+) -> list[Record]:
+    conditions = {
+        "Train": instance.train,
+        "Validation": instance.validation,
+        "Test": instance.test,
+    }
+    return evaluate_instance(context.agent, context.table, features, instance, arm, conditions)
 
 
 def _features(context: Context, instance: AttackInstance, house: House) -> Tensor:
@@ -127,7 +130,7 @@ def _features(context: Context, instance: AttackInstance, house: House) -> Tenso
         house,
         context.agent.encoder,
         cameras,
-        context.config.rendering.evaluation_spp,
+        context.config.evaluation_spp,
         context.seed("views", "object", instance.id),
     )
     clean = context.place(clean_features(context, instance.scan), instance.scan)

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from vlnhijack.artifacts import read_rows
-from vlnhijack.experiments.attack_stage import AttackFiles
+from vlnhijack.experiments.attacks import Attack
 from vlnhijack.experiments.context import Context
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.observe import render_views
@@ -16,13 +16,12 @@ WIDTH, HEIGHT, SPP = 640, 480, 16
 _VIEWS = 3
 
 
-def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame) -> None:
-    """Write the pictures of an evaluated instance, unless they are there."""
-    folder = context.folder / "attacks" / instance.id
+def illustrate(context: Context, attack: Attack, records: pd.DataFrame) -> None:
+    """Write the pictures of an evaluated attack, unless they are there."""
+    folder, instance = attack.folder, attack.instance
     if (folder / "map.png").exists():
         return
-    files = AttackFiles(folder)
-    house, attacked = context.houses[instance.scan], load_house(files.house)
+    house, attacked = context.houses[instance.scan], load_house(attack.house)
     views = _best_views(context, instance)
     position = house.graph.positions[house.graph.row(instance.viewpoint)].tolist()
     cameras = [panorama_cameras(tuple(position), WIDTH, HEIGHT)[view] for view in views]
@@ -34,7 +33,7 @@ def illustrate(context: Context, instance: AttackInstance, records: pd.DataFrame
     before_after(
         folder / "before_after.png", list(before), list(after), [f"view {view}" for view in views]
     )
-    curve(folder / "curve.png", read_rows(files.log), read_rows(files.validations))
+    curve(folder / "curve.png", read_rows(attack.log), read_rows(attack.validations))
     test = records[records["condition"] == "Test"]
     clean, hijacked = (
         [list(path) for path in test.loc[test["arm"] == arm, "path"]]

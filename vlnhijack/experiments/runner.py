@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import torch
 from rich.console import Console
@@ -17,14 +18,16 @@ from rich.table import Table
 from vlnhijack.artifacts import read_json, write_json
 from vlnhijack.errors import InputError
 from vlnhijack.evaluation.records import save_records
-from vlnhijack.evaluation.tables import rows_for_print, summarise
-from vlnhijack.experiments.attack_stage import attack
+from vlnhijack.evaluation.tables import ATTACKED, arms_of, rows_for_print, summarise
+from vlnhijack.experiments.attack_stage import run_attack
+from vlnhijack.experiments.attacks import Attack, make_attacks
 from vlnhijack.experiments.baseline import baseline
 from vlnhijack.experiments.config import ExperimentConfig, StoredInstances
 from vlnhijack.experiments.context import Context, load_context
 from vlnhijack.experiments.evaluation_stage import evaluate
 from vlnhijack.experiments.instances.files import load_instances
 from vlnhijack.experiments.instances.houses import draw, pick
+from vlnhijack.experiments.overfitting import overfitting
 from vlnhijack.experiments.pictures import illustrate
 from vlnhijack.experiments.yaml_config import load_config, save_config
 from vlnhijack.threat import AttackInstance
@@ -45,20 +48,36 @@ def run(
     instances = make_instances(context)
     open_folder(config, folder, resume=resume)
     write_json(folder / "instances.json", [asdict(instance) for instance in instances])
+    attacks = make_attacks(config, folder, instances)
     seconds = {"baseline": sum(baseline(context, scan) for scan in used_scans(instances))}
-    seconds |= {"attack": 0.0, "evaluation": 0.0}
-    frames = []
-    for instance in instances:
-        seconds["attack"] += attack(context, instance)
-        frame, taken = evaluate(context, instance)
-        seconds["evaluation"] += taken
-        illustrate(context, instance, frame)
+    seconds |= {"attack": 0.0, "overfitting": 0.0, "evaluation": 0.0}
+    frames, reports = [], {}
+    for attack in attacks:
+        taken = run_attack(context, attack)
+        gap = overfitting(context, attack)
+        frame, evaluated = evaluate(context, attack)
+        illustrate(context, attack, frame)
         frames.append(frame)
-    records = pd.concat(frames, ignore_index=True)
+        reports[attack.id] = {"rung": attack.rendering.name, **gap, "seconds": taken}
+        seconds["attack"] += taken
+        seconds["overfitting"] += gap["seconds"]
+        seconds["evaluation"] += evaluated
+    records = all_records(attacks, frames)
     save_records(folder / "records.parquet", records)
-    summary = {**summarise(records), "seconds": seconds}
+    summary = {**summarise(records), "attacks": reports, "seconds": seconds}
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def all_records(attacks: Sequence[Attack], frames: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Records of all attacks with their rung; the controls of an instance once, without one."""
+    parts, seen = [], set()
+    for attack, frame in zip(attacks, frames, strict=True):
+        attacked = frame["arm"] == ATTACKED
+        part = frame.assign(rung=np.where(attacked, attack.rendering.name, ""))
+        parts.append(part[attacked] if attack.instance.id in seen else part)
+        seen.add(attack.instance.id)
+    return pd.concat(parts, ignore_index=True)
 
 
 def make_repeatable(threads: int) -> None:
@@ -121,13 +140,25 @@ def print_summary(console: Console, config: ExperimentConfig, folder: Path) -> N
     """The table of condition Test, percent with 95 % intervals."""
     summary = read_json(folder / "summary.json")
     table = Table(title=f"{config.name}: condition Test, % [95 % interval]", caption=config.note)
-    for column in ("attack", "measure", "n", "clean", "noise", "attacked"):
+    for column in ("attack", "measure", "n", *arms_of(summary)):
         table.add_column(column, justify="left" if column in ("attack", "measure") else "right")
     for row in rows_for_print(summary):
         table.add_row(*row)
     console.print(table)
+    console.print(_attacks_table(summary["attacks"]))
     seconds = {stage: round(taken) for stage, taken in summary["seconds"].items()}
     console.print(f"seconds: {json.dumps(seconds)}; everything is in {folder}")
+
+
+def _attacks_table(attacks: dict[str, dict[str, Any]]) -> Table:
+    table = Table(title="loss of the training episodes at the attack's own camera rays and others")
+    for column in ("attack", "seconds", "own rays", "other rays", "gap, %"):
+        table.add_column(column, justify="left" if column == "attack" else "right", overflow="fold")
+    for name, row in attacks.items():
+        others = f"{row['loss_other_rays']:.3f} ± {row['deviation']:.3f}"
+        gap = f"{100 * row['gap']:.1f}"
+        table.add_row(name, f"{row['seconds']:.0f}", f"{row['loss_own_rays']:.3f}", others, gap)
+    return table
 
 
 def _version(package: str) -> str:

@@ -86,17 +86,18 @@ def _deepest_error(file: Path | None, values: dict[str, Any], error: ValidationE
         expected = "no such key"
     if found["type"] == "missing":
         expected, received = "a value", "nothing"
-    field = ".".join(_keys(values, found["loc"]))
+    absent = [str(found["loc"][-1])] if found["type"] == "missing" else []
+    field = ".".join(_keys(values, found["loc"]) + absent)
     if found["type"] == "value_error":
         return InputError(str(found["ctx"]["error"]), file=file, field=field or None)
     return InputError(file=file, field=field, expected=expected, received=received)
 
 
 def _keys(values: Any, location: Sequence[str | int]) -> list[str]:
-    """The keys of a location without the names of the alternatives of a union."""
+    """The keys of a location that are there, without the names of the alternatives of a union."""
     keys = []
-    for part in location[:-1]:
+    for part in location:
         if isinstance(part, int) or (isinstance(values, dict) and part in values):
             keys.append(str(part))
             values = values[part]
-    return [*keys, *map(str, location[-1:])]
+    return keys

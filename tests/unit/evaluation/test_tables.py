@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from vlnhijack import seeds
-from vlnhijack.evaluation.tables import interval, rows_for_print, stronger_noise, summarise
+from vlnhijack.evaluation.tables import arms_of, interval, rows_for_print, stronger_noise, summarise
 
 
 def rows(count: int, **changes: Any) -> list[dict[str, Any]]:
@@ -15,6 +15,7 @@ def rows(count: int, **changes: Any) -> list[dict[str, Any]]:
         "scan": "alder",
         "object": "chair_0",
         "arm": "clean",
+        "rung": "frozen_16spp",
         "condition": "Test",
         "path_id": 0,
         "stopped": False,
@@ -69,6 +70,22 @@ def test_every_condition_has_its_tables() -> None:
     assert conditions["Train"]["single_step"]["attacked"]["n"] == 5
     assert conditions["Train"]["single_step"]["attacked"]["stop_rate"] == 1
     assert conditions["Validation"]["single_step"] == {}
+
+
+def test_attacks_of_several_rungs_are_arms_of_their_own() -> None:
+    records = experiment()
+    attacked = records["arm"] == "attacked"
+    several = pd.concat([records, records[attacked].assign(rung="prb_4spp", stopped=False)])
+    summary = summarise(several)
+    single = summary["single_step"]
+    assert {arm: (row["n"], row["stop_rate"]) for arm, row in single.items()} == {
+        "clean": (4, 0.0),
+        "noise": (4, 0.5),
+        "frozen_16spp": (4, 0.75),
+        "prb_4spp": (4, 0.0),
+    }
+    assert arms_of(summary) == ["clean", "noise", "frozen_16spp", "prb_4spp"]
+    assert all(len(row) == 3 + 4 for row in rows_for_print(summary))
 
 
 def test_the_noise_that_is_stronger_on_test_counts_for_each_kind() -> None:

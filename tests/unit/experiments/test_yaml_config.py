@@ -18,6 +18,12 @@ instances:
 - {kind: trajectory, house: alder, object: sofa_0, viewpoint: a, target: b}
 """
 
+SEVERAL = """
+rendering:
+- {attack_spp: 4, evaluation_spp: 4}
+- {rung: fixed-illumination, evaluation_spp: 4, refresh_every: 10}
+"""
+
 
 def write(folder: Path, text: str) -> Path:
     file = folder / "a.yaml"
@@ -46,7 +52,7 @@ def test_what_is_not_said_has_the_papers_value(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("text", [DRAWN, PICKED])
+@pytest.mark.parametrize("text", [DRAWN, PICKED, DRAWN + SEVERAL])
 def test_a_saved_config_is_the_same(tmp_path: Path, text: str) -> None:
     config = load_config(write(tmp_path, text), ExperimentConfig)
     save_config(tmp_path / "saved.yaml", config)
@@ -117,6 +123,29 @@ def test_errors_in_drawn_instances_name_their_key(
     ],
 )
 def test_light_is_renewed_by_the_rung_that_has_it_and_at_checkpoints(
+    tmp_path: Path, rendering: str, expected: str
+) -> None:
+    assert message(write(tmp_path, f"{DRAWN}\nrendering: {rendering}")).startswith(expected)
+
+
+def test_several_renderings_have_names_of_their_own(tmp_path: Path) -> None:
+    config = load_config(write(tmp_path, DRAWN + SEVERAL), ExperimentConfig)
+    names = [rendering.name for rendering in config.renderings]
+    assert names == ["frozen_4spp", "fixed-illumination_16spp_refresh10"]
+    assert config.evaluation_spp == 4
+
+
+@pytest.mark.parametrize(
+    ("rendering", "expected"),
+    [
+        ("[]", "a.yaml: rendering: expected a valid"),
+        ("[{}, {attack_spp: 3}]", "a.yaml: rendering.1.attack_spp: expected a square number, r"),
+        ("[{}, {max_memory: 99}]", "a.yaml: rendering: each rung, attack_spp and refresh_every on"),
+        ("[{}, {rung: prb, evaluation_spp: 4}]", "a.yaml: rendering.evaluation_spp must be the s"),
+        ("[{}, {attack_spp: 4, refresh_every: 9}]", "a.yaml: rendering.refresh_every needs rend"),
+    ],
+)
+def test_renderings_that_cannot_be_compared_are_refused(
     tmp_path: Path, rendering: str, expected: str
 ) -> None:
     assert message(write(tmp_path, f"{DRAWN}\nrendering: {rendering}")).startswith(expected)

@@ -1,0 +1,71 @@
+"""The attacks of an experiment: every instance with every rendering, each in its own folder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vlnhijack.artifacts import read_rows
+from vlnhijack.attack.optimise import Validation, best
+from vlnhijack.experiments.config import ExperimentConfig, RenderSettings
+from vlnhijack.threat import AttackInstance
+
+
+@dataclass(frozen=True, eq=False)
+class Attack:
+    """An instance, the rendering that it is optimised with, and the files of its folder."""
+
+    instance: AttackInstance
+    rendering: RenderSettings
+    folder: Path
+
+    @property
+    def id(self) -> str:
+        return self.folder.name
+
+    @property
+    def result(self) -> Path:
+        return self.folder / "attack.json"
+
+    @property
+    def overfitting(self) -> Path:
+        return self.folder / "overfitting.json"
+
+    @property
+    def log(self) -> Path:
+        return self.folder / "log.jsonl"
+
+    @property
+    def validations(self) -> Path:
+        return self.folder / "validation.jsonl"
+
+    @property
+    def house(self) -> Path:
+        return self.folder / "house"
+
+    def state(self, iteration: int) -> Path:
+        return self.folder / "checkpoints" / f"{iteration:05d}.safetensors"
+
+    def last_iteration(self) -> int:
+        """The iteration of the last checkpoint that was validated; 0 without one."""
+        return max((row["iteration"] for row in read_rows(self.validations)), default=0)
+
+    def best(self) -> Validation:
+        """The checkpoint with the highest nDTW on the validation episodes."""
+        rows = read_rows(self.validations)
+        return best([Validation(row["iteration"], row["ndtw"], row["loss"]) for row in rows])
+
+
+def make_attacks(
+    config: ExperimentConfig, folder: Path, instances: Sequence[AttackInstance]
+) -> list[Attack]:
+    """Their ids are those of the instances, with the rendering's name where it is one of a list."""
+    listed = isinstance(config.rendering, list)
+    return [
+        Attack(
+            instance,
+            rendering,
+            folder / "attacks" / (f"{instance.id}-{rendering.name}" if listed else instance.id),
+        )
+        for instance in instances
+        for rendering in config.renderings
+    ]

@@ -1,0 +1,70 @@
+"""Does an attack overfit the camera rays that it was optimised at? Its loss at others tells."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+
+from vlnhijack.artifacts import read_json, write_json
+from vlnhijack.experiments.attack_stage import exported_texture, training
+from vlnhijack.experiments.attacks import Attack
+from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.rungs import attack_renderer
+
+_SEEDS = 8
+
+
+def overfitting(context: Context, attack: Attack) -> dict[str, Any]:
+    """Loss of a finished attack at its own camera rays and at others; measured once.
+
+    Of the exported texture, over all training episodes, by the rung and samples per pixel of the
+    attack; the light of a rung that renews it is that around the texture. See `loss_gap`.
+    """
+    if attack.overfitting.exists():
+        return read_json(attack.overfitting)
+    started = time.perf_counter()
+    seeds = [
+        context.seed("views", stream, attack.instance.id)
+        for stream in ("attack", *(f"overfitting {k}" for k in range(_SEEDS)))
+    ]
+    found = loss_gap(_loss(context, attack), *seeds)
+    report = {**found, "seconds": time.perf_counter() - started}
+    write_json(attack.overfitting, report)
+    return report
+
+
+def loss_gap(loss: Callable[[int], float], own: int, *others: int) -> dict[str, float]:
+    """What the loss at the seed `own` understates.
+
+    loss_own_rays; loss_other_rays and deviation: mean and standard deviation over the other seeds;
+    gap: the difference as a share of loss_own_rays.
+    """
+    at_own = loss(own)
+    elsewhere = [loss(seed) for seed in others]
+    return {
+        "loss_own_rays": at_own,
+        "loss_other_rays": float(np.mean(elsewhere)),
+        "deviation": float(np.std(elsewhere, ddof=1)),
+        "gap": float(np.mean(elsewhere)) / at_own - 1,
+    }
+
+
+def _loss(context: Context, attack: Attack) -> Callable[[int], float]:
+    instance, settings = attack.instance, attack.rendering
+    exported = exported_texture(context, attack)
+    views, objective = training(context, attack)
+    house = context.houses[instance.scan]
+    if settings.refresh_every:
+        house = house.with_texture(instance.object_id, exported)
+
+    @torch.no_grad()
+    def loss(seed: int) -> float:
+        cameras = views.renderer.cameras
+        renderer = attack_renderer(settings, house, instance.object_id, cameras, seed)
+        features = replace(views, renderer=renderer).features(torch.from_numpy(exported))
+        return objective(features, torch.arange(len(objective.first))).mean().item()
+
+    return loss
