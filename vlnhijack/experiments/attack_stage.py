@@ -10,6 +10,7 @@ from rich.progress import TaskID
 from safetensors.torch import load_file, save
 from torch import Tensor
 
+from vlnhijack import seeds
 from vlnhijack.artifacts import (
     append_row,
     read_json,
@@ -36,6 +37,7 @@ from vlnhijack.experiments.views import house_cameras
 from vlnhijack.frames import Camera
 from vlnhijack.navigation.views import VIEWS
 from vlnhijack.rendering.fixed_illumination import FixedIlluminationRenderer
+from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.exr import write_exr
 from vlnhijack.scenes.house_files import save_house
@@ -145,8 +147,7 @@ def _checkpointed(
         context.agent, context.table, instance, instance.validation, validation
     )
     seed = context.seed("attack", instance.id)
-    refresh_every = attack.rendering.refresh_every
-    _renew_light(views.renderer, texture, refresh_every, first)
+    _renew(views.renderer, texture, attack.rendering.refresh_every, first, seed)
     for row in optimise(texture, views, objective, schedule, seed, first):
         append_row(attack.log, row._asdict())
         context.progress.update(
@@ -155,14 +156,19 @@ def _checkpointed(
         if row.iteration % schedule.checkpoint_every == 0 or row.iteration == schedule.iterations:
             found = _validate(context, instance, validation, held_out, texture, row.iteration)
             _save_checkpoint(attack, texture, found, seed, time.perf_counter() - started)
-        _renew_light(views.renderer, texture, refresh_every, row.iteration)
+        _renew(views.renderer, texture, attack.rendering.refresh_every, row.iteration, seed)
         yield row
 
 
-def _renew_light(renderer: Renderer, texture: ProjectedAdam, every: int, iteration: int) -> None:
-    """After each `every` iterations, the light that a fixed-illumination rung holds still."""
-    is_due = every > 0 and iteration > 0 and iteration % every == 0
-    if is_due and isinstance(renderer, FixedIlluminationRenderer):
+def _renew(
+    renderer: Renderer, texture: ProjectedAdam, refresh_every: int, iteration: int, seed: int
+) -> None:
+    """After an iteration: other camera rays for `prb`; after each `refresh_every`, other light for
+    `fixed-illumination`."""
+    is_due = refresh_every > 0 and iteration > 0 and iteration % refresh_every == 0
+    if isinstance(renderer, MitsubaRenderer):
+        renderer.seed = seeds.integer(seed, "camera rays", iteration)
+    elif is_due and isinstance(renderer, FixedIlluminationRenderer):
         renderer.refresh(texture.value)
 
 

@@ -6,7 +6,7 @@ import torch
 from tests.houses import tiny_house
 from vlnhijack.attack.projected_adam import ProjectedAdam
 from vlnhijack.errors import InputError
-from vlnhijack.experiments.attack_stage import _renew_light
+from vlnhijack.experiments.attack_stage import _renew
 from vlnhijack.experiments.config import RenderSettings
 from vlnhijack.experiments.rungs import attack_renderer, unbiased_renderer
 from vlnhijack.frames import Camera
@@ -51,7 +51,21 @@ def test_light_is_renewed_after_every_so_many_iterations(monkeypatch: pytest.Mon
         torch.rand(4, 4, 3), torch.ones(4, 4, dtype=torch.bool), epsilon=0.1, lr=0.01
     )
     for iteration in range(8):
-        _renew_light(renderer, texture, 3, iteration)
+        _renew(renderer, texture, 3, iteration, 0)
     assert len(renewed) == 2
-    _renew_light(renderer, texture, 0, 3)
+    _renew(renderer, texture, 0, 3, 0)
     assert len(renewed) == 2
+
+
+def test_prb_draws_other_rays_in_every_iteration_and_the_same_after_a_resume() -> None:
+    renderer = MitsubaRenderer(tiny_house(), "cabinet_0", CAMERAS, 4, 1)
+    texture = ProjectedAdam(
+        torch.rand(64, 64, 3), torch.ones(64, 64, dtype=torch.bool), epsilon=0.1, lr=0.01
+    )
+    seeds, images = [], []
+    for iteration in (0, 1, 2, 1):
+        _renew(renderer, texture, 0, iteration, 5)
+        seeds.append(renderer.seed)
+        images.append(renderer(texture.value).detach())
+    assert len(set(seeds)) == 3 and seeds[3] == seeds[1]
+    assert torch.equal(images[3], images[1]) and not torch.equal(images[2], images[1])
