@@ -60,7 +60,7 @@ def outlined(image: ArrayLike, mask: NDArray[np.bool_]) -> Pixels:
     pixels = _pixels(image)
     wide = OUTLINE * max(1, round(pixels.shape[1] / SHEET_TILE))
     line = binary_dilation(mask, np.ones((3, 3)), iterations=wide) & ~mask
-    return np.where(line[..., None], np.float32(to_rgb(HIGHLIGHT)), pixels)
+    return np.where(line[..., None], np.asarray(to_rgb(HIGHLIGHT), np.float32), pixels)
 
 
 def before_after(
