@@ -18,6 +18,7 @@ from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.views import nearest_view
 
 MAX_WORDS = 60
+_TOGETHER = 20
 
 
 class Instructions(NamedTuple):
@@ -27,8 +28,10 @@ class Instructions(NamedTuple):
     mask: Tensor
 
     def rows(self, episodes: Tensor) -> "Instructions":
-        """The instructions of the given episodes (K,)."""
-        return Instructions(text_rows(self.text, episodes), self.mask[episodes])
+        """The instructions of the given episodes (K,), no longer than the longest of them."""
+        mask = self.mask[episodes]
+        longest = int(mask.sum(1).max())
+        return Instructions(text_rows(self.text, episodes, longest), mask[:, :longest])
 
 
 def read_instructions(
@@ -143,8 +146,28 @@ def step_logits(
     """Logits (K,N) of K visual steps: step `steps[k]` of episode `episodes[k]`.
 
     features (M,36,D) of all viewpoints of the table; past (B,T,H) as `history` gives it. Gradients
-    flow to features through the observation and through the history.
+    flow to features through the observation and through the history. Steps that read texts of like
+    length go through the policy together, so that it computes little padding.
     """
+    order = instructions.mask.sum(1)[episodes].argsort(stable=True)
+    logits = [
+        _logits(policy, table, features, past, instructions, walked, episodes[part], steps[part])
+        for part in order.split(_TOGETHER)
+    ]
+    return torch.cat(logits)[order.argsort()]
+
+
+def _logits(
+    policy: Policy,
+    table: ObservationTable,
+    features: Tensor,
+    past: Tensor,
+    instructions: Instructions,
+    walked: Trajectories,
+    episodes: Tensor,
+    steps: Tensor,
+) -> Tensor:
+    past = past[episodes, : int(steps.max()) + 1]
     past_mask = torch.arange(past.shape[1])[None] <= steps[:, None]
     viewpoints, views = walked.viewpoints[episodes, steps], walked.views[episodes, steps]
     seen = table.observe(viewpoints, views)
@@ -152,7 +175,7 @@ def step_logits(
     return policy(
         read.text,
         read.mask,
-        past[episodes],
+        past,
         past_mask,
         gather_views(features, viewpoints, seen.rows),
         seen.angles,
