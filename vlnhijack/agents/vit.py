@@ -65,8 +65,7 @@ class Attention(nn.Module):
         queries = self.qkv(tokens[:, rows], slice(width))
         keys, values = self.qkv(tokens, slice(width, None)).chunk(2, -1)
         query, key, value = (
-            part.unflatten(-1, (self.heads, -1)).transpose(1, 2)
-            for part in (queries, keys, values)
+            part.unflatten(-1, (self.heads, -1)).transpose(1, 2) for part in (queries, keys, values)
         )
         return self.proj(attend(query, key, value).transpose(1, 2).flatten(2))
 

@@ -1,4 +1,4 @@
-"""`vlnhijack bench`: measure the renderers."""
+"""`vlnhijack bench`: measure renderers and attacks."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vlnhijack.cli.bench_attack import attack
 from vlnhijack.cli.console import console, progress_bars
 
 if TYPE_CHECKING:
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
 
     from vlnhijack.experiments.bench_render import Row
 
-app = typer.Typer(no_args_is_help=True, help="Measure the renderers.")
+app = typer.Typer(no_args_is_help=True, help="Measure renderers and attacks.")
+app.command()(attack)
 
 
 @app.command()
