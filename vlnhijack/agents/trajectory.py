@@ -18,7 +18,6 @@ from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.views import nearest_view
 
 MAX_WORDS = 60
-_TOGETHER = 20
 
 
 class Instructions(NamedTuple):
@@ -146,27 +145,8 @@ def step_logits(
     """Logits (K,N) of K visual steps: step `steps[k]` of episode `episodes[k]`.
 
     features (M,36,D) of all viewpoints of the table; past (B,T,H) as `history` gives it. Gradients
-    flow to features through the observation and through the history. Steps that read texts of like
-    length go through the policy together, so that it computes little padding.
+    flow to features through the observation and through the history.
     """
-    order = instructions.mask.sum(1)[episodes].argsort(stable=True)
-    logits = [
-        _logits(policy, table, features, past, instructions, walked, episodes[part], steps[part])
-        for part in order.split(_TOGETHER)
-    ]
-    return torch.cat(logits)[order.argsort()]
-
-
-def _logits(
-    policy: Policy,
-    table: ObservationTable,
-    features: Tensor,
-    past: Tensor,
-    instructions: Instructions,
-    walked: Trajectories,
-    episodes: Tensor,
-    steps: Tensor,
-) -> Tensor:
     past = past[episodes, : int(steps.max()) + 1]
     past_mask = torch.arange(past.shape[1])[None] <= steps[:, None]
     viewpoints, views = walked.viewpoints[episodes, steps], walked.views[episodes, steps]
