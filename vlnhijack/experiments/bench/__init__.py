@@ -1,0 +1,1 @@
+"""What renderers and attacks cost, and how wrong they are."""
