@@ -55,11 +55,12 @@ def replay(
 ) -> Iterator[tuple[str, Any]]:
     """Named results in the order of the original: text, history CLS, visual step, history step…"""
     mask = given["txt_masks"]
-    text = policy.encode_text(given["txt_ids"], mask)
-    if isinstance(text, tuple):
-        yield from ((f"txt_embeds_{layer}", part) for layer, part in enumerate(text))
+    layers = policy.text_layers(given["txt_ids"], mask)
+    if policy.config.no_lang_ca:
+        yield from ((f"txt_embeds_{layer}", text) for layer, text in enumerate(layers))
     else:
-        yield "txt_embeds", text
+        yield "txt_embeds", layers[0]
+    text = policy.encode_text(given["txt_ids"], mask)
     yield "hist_cls", policy.history_cls(1)
     history, loss = [policy.history_cls(len(mask))], 0
     for t in range(int(given["n_visual"])):

@@ -12,8 +12,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from vlnhijack.agents.hamt_config import HamtConfig
-from vlnhijack.agents.hamt_layers import ALL, BertLayer, CrossLayer, additive_mask
+from vlnhijack.agents.hamt_layers import BertLayer, CrossLayer, Memory, additive_mask
 from vlnhijack.agents.policy import Text
+from vlnhijack.agents.precision import ALL
 
 _VISUAL_EPS = 1e-12
 _NAV_TYPES = 3
@@ -147,15 +148,24 @@ class Hamt(nn.Module):
         self.apply(_initialise)
 
     def encode_text(self, token_ids: Tensor, mask: Tensor) -> Text:
-        """(B,T,H), or with no_lang_ca one such tensor per cross layer and a last, unread one."""
+        """(B,T,H); with no_lang_ca, where vision changes no text, the keys and values (B,T,H) that
+        each cross layer reads, layer after layer, and the last layer's text."""
+        texts = self.text_layers(token_ids, mask)
+        if not self.config.no_lang_ca:
+            return texts[0]
+        *read, _ = texts
+        layers = zip(self._cross_layers(), read, strict=True)
+        return (*(part for layer, text in layers for part in layer.memory(text)), read[-1])
+
+    def text_layers(self, token_ids: Tensor, mask: Tensor) -> list[Tensor]:
+        """The text (B,T,H); with no_lang_ca that of each cross layer and a last, unread one."""
         scores = additive_mask(mask, self.dtype)
         text = self.embeddings(token_ids)
         for layer in self.encoder.layer:
             text = layer(text, scores)
         if not self.config.no_lang_ca:
-            return text
-        layers = cast(Iterable[CrossLayer], self.encoder.x_layers)
-        return (text, *(layer.update_text(text, scores) for layer in layers))
+            return [text]
+        return [text, *(cross.update_text(text, scores) for cross in self._cross_layers())]
 
     def history_cls(self, batch: int) -> Tensor:
         return self.hist_embeddings.first(batch)
@@ -227,14 +237,21 @@ class Hamt(nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Runs the cross layers; the last one computes the given rows only."""
         text_scores, visual_scores = (additive_mask(mask, self.dtype) for mask in masks)
-        last = self.config.num_x_layers - 1
-        current = text if isinstance(text, Tensor) else text[0]
-        for index, layer in enumerate(self.encoder.x_layers):
+        current = text if isinstance(text, Tensor) else text[-1]
+        for index, layer in enumerate(self._cross_layers()):
+            is_last = index == self.config.num_x_layers - 1
+            text_rows, visual_rows = last_rows if is_last else (ALL, ALL)
             if isinstance(text, tuple):
-                current = text[index]
-            rows = last_rows if index == last else (ALL, ALL)
-            current, visual = layer(current, text_scores, visual, visual_scores, *rows)
+                read = Memory(*text[2 * index : 2 * index + 2])
+                current = current[:, text_rows]
+            else:
+                read, seen = layer.memory(current), layer.memory(visual)
+                current = layer.new_text(current, text_scores, seen, visual_scores, text_rows)
+            visual = layer.new_visual(visual, visual_scores, read, text_scores, visual_rows)
         return current, visual
+
+    def _cross_layers(self) -> Iterable[CrossLayer]:
+        return cast(Iterable[CrossLayer], self.encoder.x_layers)
 
     def _logits(self, text_cls: Tensor, tokens: Tensor, nav_type: Tensor) -> Tensor:
         fused = tokens if self.config.no_lang_ca else tokens * text_cls

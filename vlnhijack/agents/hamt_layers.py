@@ -1,12 +1,13 @@
 """Transformer layers of HAMT: BERT layers and cross-modal layers, official parameter names."""
 
+from typing import NamedTuple
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
 from vlnhijack.agents.hamt_config import HamtConfig
-
-ALL = slice(None)
+from vlnhijack.agents.precision import ALL, Linear, attend
 
 
 def additive_mask(mask: Tensor, dtype: torch.dtype) -> Tensor:
@@ -14,25 +15,34 @@ def additive_mask(mask: Tensor, dtype: torch.dtype) -> Tensor:
     return (~mask).to(dtype)[:, None, None, :] * -10000.0
 
 
+class Memory(NamedTuple):
+    """Keys and values (B,K,H) of a context, before the heads part."""
+
+    key: Tensor
+    value: Tensor
+
+
 class Attention(nn.Module):
-    """Multi-head attention of queries (B,Q,H) to a context (B,K,H)."""
+    """Multi-head attention of queries (B,Q,H) to the memory of a context (B,K,H)."""
 
     def __init__(self, config: HamtConfig) -> None:
         super().__init__()
         self.heads = config.num_attention_heads
         self.dropout = config.attention_dropout
-        self.query = nn.Linear(config.hidden_size, config.hidden_size)
-        self.key = nn.Linear(config.hidden_size, config.hidden_size)
-        self.value = nn.Linear(config.hidden_size, config.hidden_size)
+        self.query = Linear(config.hidden_size, config.hidden_size)
+        self.key = Linear(config.hidden_size, config.hidden_size)
+        self.value = Linear(config.hidden_size, config.hidden_size)
 
-    def forward(self, queries: Tensor, context: Tensor, mask: Tensor | None) -> Tensor:
+    def memory(self, context: Tensor) -> Memory:
+        return Memory(self.key(context), self.value(context))
+
+    def forward(self, queries: Tensor, memory: Memory, mask: Tensor | None) -> Tensor:
         query, key, value = (
             tokens.unflatten(-1, (self.heads, -1)).transpose(1, 2)
-            for tokens in (self.query(queries), self.key(context), self.value(context))
+            for tokens in (self.query(queries), *memory)
         )
         dropout = self.dropout if self.training else 0.0
-        mixed = F.scaled_dot_product_attention(query, key, value, mask, dropout)
-        return mixed.transpose(1, 2).flatten(2)
+        return attend(query, key, value, mask, dropout).transpose(1, 2).flatten(2)
 
 
 class AddNorm(nn.Module):
@@ -40,7 +50,7 @@ class AddNorm(nn.Module):
 
     def __init__(self, config: HamtConfig, in_size: int) -> None:
         super().__init__()
-        self.dense = nn.Linear(in_size, config.hidden_size)
+        self.dense = Linear(in_size, config.hidden_size)
         self.LayerNorm = nn.LayerNorm(config.hidden_size, eps=config.layer_norm_eps)
         self.dropout = nn.Dropout(config.hidden_dropout)
 
@@ -51,7 +61,7 @@ class AddNorm(nn.Module):
 class Intermediate(nn.Module):
     def __init__(self, config: HamtConfig) -> None:
         super().__init__()
-        self.dense = nn.Linear(config.hidden_size, config.intermediate_size)
+        self.dense = Linear(config.hidden_size, config.intermediate_size)
 
     def forward(self, hidden: Tensor) -> Tensor:
         return F.gelu(self.dense(hidden))
@@ -67,7 +77,7 @@ class SelfAttention(nn.Module):
 
     def forward(self, hidden: Tensor, mask: Tensor | None, rows: slice = ALL) -> Tensor:
         queries = hidden[:, rows]
-        return self.output(self.self(queries, hidden, mask), queries)
+        return self.output(self.self(queries, self.self.memory(hidden), mask), queries)
 
 
 class CrossAttention(nn.Module):
@@ -78,8 +88,8 @@ class CrossAttention(nn.Module):
         self.att = Attention(config)
         self.output = AddNorm(config, config.hidden_size)
 
-    def forward(self, hidden: Tensor, context: Tensor, context_mask: Tensor) -> Tensor:
-        return self.output(self.att(hidden, context, context_mask), hidden)
+    def forward(self, hidden: Tensor, memory: Memory, mask: Tensor) -> Tensor:
+        return self.output(self.att(hidden, memory, mask), hidden)
 
 
 class BertLayer(nn.Module):
@@ -100,7 +110,6 @@ class CrossLayer(nn.Module):
 
     def __init__(self, config: HamtConfig) -> None:
         super().__init__()
-        self.no_lang_ca = config.no_lang_ca
         self.visual_attention = CrossAttention(config)
         self.lang_self_att = SelfAttention(config)
         self.lang_inter = Intermediate(config)
@@ -109,22 +118,21 @@ class CrossLayer(nn.Module):
         self.visn_inter = Intermediate(config)
         self.visn_output = AddNorm(config, config.intermediate_size)
 
-    def forward(
-        self,
-        text: Tensor,
-        text_mask: Tensor,
-        visual: Tensor,
-        visual_mask: Tensor,
-        text_rows: slice = ALL,
-        visual_rows: slice = ALL,
-    ) -> tuple[Tensor, Tensor]:
+    def memory(self, tokens: Tensor) -> Memory:
+        """What the other modality reads of these tokens."""
+        return self.visual_attention.att.memory(tokens)
+
+    def new_visual(
+        self, visual: Tensor, mask: Tensor, text: Memory, text_mask: Tensor, rows: slice = ALL
+    ) -> Tensor:
         attended = self.visual_attention(visual, text, text_mask)
-        attended = self.visn_self_att(attended, visual_mask, visual_rows)
-        new_visual = self.visn_output(self.visn_inter(attended), attended)
-        if self.no_lang_ca:
-            return text[:, text_rows], new_visual
-        attended = self.visual_attention(text, visual, visual_mask)
-        return self.update_text(attended, text_mask, text_rows), new_visual
+        attended = self.visn_self_att(attended, mask, rows)
+        return self.visn_output(self.visn_inter(attended), attended)
+
+    def new_text(
+        self, text: Tensor, mask: Tensor, visual: Memory, visual_mask: Tensor, rows: slice = ALL
+    ) -> Tensor:
+        return self.update_text(self.visual_attention(text, visual, visual_mask), mask, rows)
 
     def update_text(self, text: Tensor, mask: Tensor, rows: slice = ALL) -> Tensor:
         attended = self.lang_self_att(text, mask, rows)

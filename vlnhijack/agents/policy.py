@@ -16,7 +16,8 @@ class Policy(Protocol):
     """
 
     def encode_text(self, token_ids: Tensor, mask: Tensor) -> Text:
-        """token_ids (B,T) int64, mask (B,T) bool; the result is opaque but for `text_rows`."""
+        """token_ids (B,T) int64, mask (B,T) bool; the result, one tensor (B,T,…) or several, is
+        opaque but for `text_rows`."""
         ...
 
     def history_cls(self, batch: int) -> Tensor:
@@ -53,8 +54,8 @@ class Policy(Protocol):
         ...
 
 
-def text_rows(text: Text, rows: Tensor) -> Text:
-    """Encoded text of the batch rows (R,) int64, which may repeat."""
+def text_rows(text: Text, rows: Tensor, length: int) -> Text:
+    """Encoded text of the batch rows (R,) int64, which may repeat; its first `length` tokens."""
     if isinstance(text, tuple):
-        return tuple(part[rows] for part in text)
-    return text[rows]
+        return tuple(part[rows, :length] for part in text)
+    return text[rows, :length]

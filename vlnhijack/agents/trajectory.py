@@ -27,8 +27,10 @@ class Instructions(NamedTuple):
     mask: Tensor
 
     def rows(self, episodes: Tensor) -> "Instructions":
-        """The instructions of the given episodes (K,)."""
-        return Instructions(text_rows(self.text, episodes), self.mask[episodes])
+        """The instructions of the given episodes (K,), no longer than the longest of them."""
+        mask = self.mask[episodes]
+        longest = int(mask.sum(1).max())
+        return Instructions(text_rows(self.text, episodes, longest), mask[:, :longest])
 
 
 def read_instructions(
@@ -145,6 +147,7 @@ def step_logits(
     features (M,36,D) of all viewpoints of the table; past (B,T,H) as `history` gives it. Gradients
     flow to features through the observation and through the history.
     """
+    past = past[episodes, : int(steps.max()) + 1]
     past_mask = torch.arange(past.shape[1])[None] <= steps[:, None]
     viewpoints, views = walked.viewpoints[episodes, steps], walked.views[episodes, steps]
     seen = table.observe(viewpoints, views)
@@ -152,7 +155,7 @@ def step_logits(
     return policy(
         read.text,
         read.mask,
-        past[episodes],
+        past,
         past_mask,
         gather_views(features, viewpoints, seen.rows),
         seen.angles,

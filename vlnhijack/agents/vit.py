@@ -7,10 +7,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from vlnhijack.agents.precision import ALL, Linear, attend
 from vlnhijack.errors import InputError
 
 _EPS = 1e-6
-ALL = slice(None)
 CLS = slice(0, 1)
 
 
@@ -49,29 +49,33 @@ class PatchEmbed(nn.Module):
         self.proj = nn.Conv2d(3, config.dim, config.patch, config.patch)
 
     def forward(self, images: Tensor) -> Tensor:
-        return self.proj(images).flatten(2).transpose(1, 2)
+        patches = F.pixel_unshuffle(images, self.proj.kernel_size[0]).flatten(2).transpose(1, 2)
+        return F.linear(patches, self.proj.weight.flatten(1), self.proj.bias)
 
 
 class Attention(nn.Module):
     def __init__(self, config: VitConfig) -> None:
         super().__init__()
         self.heads = config.heads
-        self.qkv = nn.Linear(config.dim, 3 * config.dim)
-        self.proj = nn.Linear(config.dim, config.dim)
+        self.qkv = Linear(config.dim, 3 * config.dim)
+        self.proj = Linear(config.dim, config.dim)
 
     def forward(self, tokens: Tensor, rows: slice) -> Tensor:
-        packed = self.qkv(tokens).unflatten(-1, (3, self.heads, -1))
-        query, key, value = packed.permute(2, 0, 3, 1, 4)
-        mixed = F.scaled_dot_product_attention(query[:, :, rows], key, value)
-        return self.proj(mixed.transpose(1, 2).flatten(2))
+        width = tokens.shape[-1]
+        queries = self.qkv(tokens[:, rows], slice(width))
+        keys, values = self.qkv(tokens, slice(width, None)).chunk(2, -1)
+        query, key, value = (
+            part.unflatten(-1, (self.heads, -1)).transpose(1, 2) for part in (queries, keys, values)
+        )
+        return self.proj(attend(query, key, value).transpose(1, 2).flatten(2))
 
 
 class Mlp(nn.Module):
     def __init__(self, config: VitConfig) -> None:
         super().__init__()
         hidden = int(config.dim * config.mlp_ratio)
-        self.fc1 = nn.Linear(config.dim, hidden)
-        self.fc2 = nn.Linear(hidden, config.dim)
+        self.fc1 = Linear(config.dim, hidden)
+        self.fc2 = Linear(hidden, config.dim)
 
     def forward(self, tokens: Tensor) -> Tensor:
         return self.fc2(F.gelu(self.fc1(tokens)))

@@ -25,8 +25,11 @@ class AttackedViews:
 
     def features(self, texture: Tensor) -> Tensor:
         """All features (M,36,D) with those of the rendered views replaced; differentiable."""
-        rendered = self.encoder(self.renderer(texture))
-        return self.clean.index_put((self.viewpoints, self.views), rendered)
+        return self.replaced(self.renderer(texture))
+
+    def replaced(self, images: Tensor) -> Tensor:
+        """`features` of the images (V,3,h,w) of the rendered views."""
+        return self.clean.index_put((self.viewpoints, self.views), self.encoder(images))
 
     def changing(self) -> Tensor:
         """Which of the M viewpoints (M,) bool have a rendered view."""

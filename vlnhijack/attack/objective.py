@@ -21,6 +21,8 @@ from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.navigation.episode import Episode
 from vlnhijack.threat import AttackInstance, guide
 
+_TOGETHER = 20
+
 
 @dataclass(frozen=True, eq=False)
 class Objective:
@@ -47,20 +49,28 @@ class Objective:
         """
         walked = Trajectories(*(part[episodes] for part in self.walked))
         batch, steps = _attack_steps(self.first[episodes], walked.lengths)
-        policy, past = self.agent.policy, self.past[episodes]
-        logits = step_logits(
-            policy,
-            self.table,
-            features,
-            renew_history(policy, self.table, features, walked, past, self.changing),
-            self.instructions.rows(episodes),
-            walked,
-            batch,
-            steps,
-        )
+        logits = self._logits(features, walked, episodes, batch, steps)
         actions = walked.actions(self.table)[batch, steps]
         negative = -logits.log_softmax(1).gather(1, actions[:, None])[:, 0]
         return negative.new_zeros(len(episodes)).index_add(0, batch, negative)
+
+    def _logits(
+        self, features: Tensor, walked: Trajectories, episodes: Tensor, batch: Tensor, steps: Tensor
+    ) -> Tensor:
+        """Logits (K,N) of step `steps[k]` of the episode in row `batch[k]` of the walked ones.
+
+        Steps that read texts of like length go through the policy together: it computes little
+        padding.
+        """
+        policy, table, past = self.agent.policy, self.table, self.past[episodes]
+        past = renew_history(policy, table, features, walked, past, self.changing)
+        read = self.instructions.rows(episodes)
+        order = read.mask.sum(1)[batch].argsort(stable=True)
+        logits = [
+            step_logits(policy, table, features, past, read, walked, batch[part], steps[part])
+            for part in order.split(_TOGETHER)
+        ]
+        return torch.cat(logits)[order.argsort()]
 
 
 def attack_objective(

@@ -29,13 +29,27 @@ class AttackSchedule:
 
 
 class Iteration(NamedTuple):
-    """What one iteration measured; `iteration` counts from 1."""
+    """What one iteration measured; `iteration` counts from 1, `stages` are parts of `seconds`."""
 
     iteration: int
     loss: float
     gradient_norm: float
     largest_change: float
     seconds: float
+    stages: dict[str, float]
+
+
+class Stopwatch:
+    """Seconds of the stages of an iteration."""
+
+    def __init__(self) -> None:
+        self.stages: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """The time since the last lap was the stage's."""
+        now = time.perf_counter()
+        self.stages[stage], self._last = now - self._last, now
 
 
 def optimise(
@@ -52,17 +66,32 @@ def optimise(
     Raises CheckError if the loss or the gradient is not finite.
     """
     for iteration in range(first + 1, schedule.iterations + 1):
-        started = time.perf_counter()
+        watch = Stopwatch()
         episodes = batch_of(seed, iteration, len(objective.first), schedule.batch)
-        loss = objective(views.features(texture.value), episodes).mean()
-        (gradient,) = torch.autograd.grad(loss, texture.value)
+        loss, gradient = loss_and_gradient(texture.value, views, objective, episodes, watch)
         norm = float(gradient.norm())
-        if not (torch.isfinite(loss) and np.isfinite(norm)):
+        if not (np.isfinite(loss) and np.isfinite(norm)):
             raise CheckError(f"iteration {iteration}: the loss or its gradient is not finite")
         texture.step(gradient)
-        yield Iteration(
-            iteration, loss.item(), norm, texture.largest_change(), time.perf_counter() - started
-        )
+        change = texture.largest_change()
+        watch.lap("update")
+        seconds = sum(watch.stages.values())
+        yield Iteration(iteration, loss, norm, change, seconds, watch.stages)
+
+
+def loss_and_gradient(
+    texture: Tensor, views: AttackedViews, objective: Objective, episodes: Tensor, watch: Stopwatch
+) -> tuple[float, Tensor]:
+    """Mean loss of the episodes (B,) and its gradient (H,W,3); the watch times four stages."""
+    images = views.renderer(texture)
+    watch.lap("render")
+    features = views.replaced(images)
+    watch.lap("vision")
+    loss = objective(features, episodes).mean()
+    watch.lap("policy")
+    (gradient,) = torch.autograd.grad(loss, texture)
+    watch.lap("backward")
+    return loss.item(), gradient
 
 
 def batch_of(seed: int, iteration: int, episodes: int, batch: int) -> Tensor:

@@ -1,4 +1,4 @@
-"""`vlnhijack bench`: measure what rendering costs."""
+"""`vlnhijack bench`: measure renderers and attacks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from vlnhijack.cli.bench_attack import attack
 from vlnhijack.cli.console import console, progress_bars
 
 if TYPE_CHECKING:
@@ -14,12 +15,8 @@ if TYPE_CHECKING:
     from vlnhijack.experiments.bench.subject import Subject
     from vlnhijack.scenes.house import House
 
-app = typer.Typer(no_args_is_help=True, help="Measure time, memory and error.")
-
-
-@app.callback()
-def _measure() -> None:
-    """Each measurement is a command of its own."""
+app = typer.Typer(no_args_is_help=True, help="Measure renderers and attacks.")
+app.command()(attack)
 
 
 @app.command()

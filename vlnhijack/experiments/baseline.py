@@ -22,7 +22,6 @@ def clean_features(context: Context, scan: str) -> Tensor:
     house, encoder = context.houses[scan], context.agent.encoder
     spp = context.config.evaluation_spp
     seed = context.seed("views", "evaluation", scan)
-    house_hash = sha256(house_folder(scan) / "house.json")
 
     def encode() -> Features:
         task = context.progress.add_task(
@@ -36,10 +35,17 @@ def clean_features(context: Context, scan: str) -> Tensor:
         house.graph,
         encoder.feature_size,
         encoder.image_size,
-        f"agent {sha256(context.agent.path)}, house {house_hash}, {spp} spp, seed {seed}",
+        made_by(context, scan, spp, seed),
         encode,
     )
     return torch.from_numpy(features)
+
+
+def made_by(context: Context, scan: str, spp: int, seed: int) -> str:
+    """What the features of a clean house's views hang on."""
+    agent, house = sha256(context.agent.path), sha256(house_folder(scan) / "house.json")
+    precision = context.precision["vision"]
+    return f"agent {agent}, {precision}, house {house}, {spp} spp, seed {seed}"
 
 
 def baseline(context: Context, scan: str) -> float:

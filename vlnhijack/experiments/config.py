@@ -13,6 +13,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from vlnhijack.agents.precision import Precision
 from vlnhijack.experiments.yaml_config import Settings, SquareInt
 
 CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
@@ -130,6 +131,13 @@ class RenderSettings(Settings):
         return f"{self.rung}_{self.attack_spp}spp{refreshed}"
 
 
+class PrecisionSettings(Settings):
+    """In which the transformers multiply; see `default_precision` for what is not set."""
+
+    vision: Precision | None = None
+    policy: Precision | None = None
+
+
 class AttackSettings(Settings):
     """The paper's settings (section 4); see AttackSchedule."""
 
@@ -159,6 +167,7 @@ class ExperimentConfig(Settings):
         RenderSettings()
     )
     attack: AttackSettings = AttackSettings()
+    precision: PrecisionSettings = PrecisionSettings()
 
     @field_validator("instances")
     @classmethod

@@ -13,6 +13,7 @@ from torch import Tensor
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.agents.precision import Precision, default_precision, set_precision
 from vlnhijack.experiments.config import (
     DrawnInstances,
     ExperimentConfig,
@@ -42,6 +43,16 @@ class Context:
     @cached_property
     def table(self) -> ObservationTable:
         return observation_table([house.graph for house in self.houses.values()])
+
+    @property
+    def precision(self) -> dict[str, Precision]:
+        """Of "vision" and "policy"."""
+        wanted, agent = self.config.precision, self.agent
+        width = agent.policy.config.hidden_size
+        return {
+            "vision": wanted.vision or default_precision(agent.encoder.feature_size),
+            "policy": wanted.policy or default_precision(width),
+        }
 
     def rows(self, scan: str) -> slice:
         """Rows of a scan's viewpoints in the table and in feature tensors."""
@@ -80,9 +91,12 @@ class Context:
 
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
-    """Load the agent and the houses that the experiment names."""
+    """Load the agent, at the precisions of the experiment, and the houses that it names."""
     houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
-    return Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+    context = Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+    set_precision(context.agent.encoder, context.precision["vision"])
+    set_precision(context.agent.policy, context.precision["policy"])
+    return context
 
 
 def house_list(wanted: list[PickedInstance] | DrawnInstances | StoredInstances) -> list[str]:

@@ -8,6 +8,7 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from vlnhijack.agents.view_cache import cached_views
 from vlnhijack.artifacts import read_json, write_json
 from vlnhijack.evaluation.apply_check import (
     check_other_samples,
@@ -20,7 +21,7 @@ from vlnhijack.evaluation.records import Record, load_records, save_records, to_
 from vlnhijack.evaluation.tables import ATTACKED
 from vlnhijack.experiments.attack_stage import exported_texture, object_views
 from vlnhijack.experiments.attacks import Attack
-from vlnhijack.experiments.baseline import clean_features
+from vlnhijack.experiments.baseline import clean_features, made_by
 from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.rungs import unbiased_renderer
 from vlnhijack.experiments.views import encode_cameras
@@ -126,12 +127,14 @@ def _features(context: Context, instance: AttackInstance, house: House) -> Tenso
     Views that do not see the object are the clean ones: the same house, the same samples.
     """
     rows, views, cameras = object_views(context, instance)
-    seen = encode_cameras(
-        house,
-        context.agent.encoder,
-        cameras,
-        context.config.evaluation_spp,
-        context.seed("views", "object", instance.id),
+    spp = context.config.evaluation_spp
+    seed = context.seed("views", "object", instance.id)
+    seen = cached_views(
+        context.folder / "features",
+        f"{made_by(context, instance.scan, spp, seed)}, object {instance.object_id}",
+        house.surface(instance.object_id).texture,
+        torch.stack([rows, views], 1),
+        lambda: encode_cameras(house, context.agent.encoder, cameras, spp, seed),
     )
     clean = context.place(clean_features(context, instance.scan), instance.scan)
     return clean.index_put((rows, views), seen)

@@ -121,7 +121,7 @@ def test_text_rows_may_repeat(policy: Hamt, given: dict[str, Tensor]) -> None:
     rows = torch.tensor([2, 0, 0])
     encoded = policy.encode_text(given["token_ids"], given["text_mask"])
     again = policy.encode_text(given["token_ids"][rows], given["text_mask"][rows])
-    torch.testing.assert_close(text_rows(encoded, rows), again, rtol=1e-5, atol=1e-5)
+    torch.testing.assert_close(text_rows(encoded, rows, T), again, rtol=1e-5, atol=1e-5)
 
 
 def test_feature_dropout_acts_in_training_only(given: dict[str, Tensor]) -> None:

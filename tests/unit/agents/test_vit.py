@@ -46,3 +46,9 @@ def test_parameter_names_are_those_of_timm(vit: VisionTransformer) -> None:
 def test_sizes_that_do_not_divide_are_refused(wrong: dict) -> None:
     with pytest.raises(InputError):
         VitConfig(**{**CONFIG.to_mapping(), **wrong})
+
+
+def test_patches_are_embedded_as_by_the_convolution(vit: VisionTransformer) -> None:
+    images = torch.randn(2, 3, 12, 20)
+    expected = vit.patch_embed.proj(images).flatten(2).transpose(1, 2)
+    torch.testing.assert_close(vit.patch_embed(images), expected, rtol=1e-5, atol=1e-5)

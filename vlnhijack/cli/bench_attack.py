@@ -1,0 +1,79 @@
+"""`vlnhijack bench attack`: what an iteration of the paper's size costs."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from vlnhijack.cli.console import console, progress_bars
+
+if TYPE_CHECKING:
+    from vlnhijack.experiments.bench.attack import AttackCost
+
+
+class PresetName(StrEnum):
+    r2r = "r2r"
+    rxr = "rxr"
+
+
+def attack(
+    preset: Annotated[PresetName, typer.Option(help="Sizes of agent and instructions.")] = (
+        PresetName.r2r
+    ),
+    house: Annotated[str, typer.Option(help="A baked house: its folder, or its name.")] = "alder",
+    seed: Annotated[int, typer.Option(help="Draws weights, instructions and features.")] = 0,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of PyTorch.")] = 2,
+    out: Annotated[Path, typer.Option(help="Folder of attack.json.")] = Path("bench"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+) -> None:
+    """Seconds of an attack's iteration by stage, its memory, and what bfloat16 changes."""
+    from vlnhijack.artifacts import write_json
+    from vlnhijack.experiments.bench.attack import bench_attack
+    from vlnhijack.experiments.bench.paper_scale import PRESETS, paper_scale
+    from vlnhijack.experiments.runner import make_repeatable
+    from vlnhijack.scenes.house_files import load_house
+    from vlnhijack.settings import house_folder
+
+    make_repeatable(threads)
+    scale = paper_scale(PRESETS[preset.value], load_house(house_folder(house)), seed)
+    with progress_bars() as progress:
+        cost = bench_attack(scale, progress)
+    settings = {"preset": preset.value, "house": house, "seed": seed, "threads": threads}
+    rows = [vars(row) for row in cost.rows]
+    write_json(out / "attack.json", {**cost.summary(), "rows": rows, "settings": settings})
+    if as_json:
+        print(json.dumps(cost.summary()))
+    else:
+        _print(cost, settings)
+        console.print(f"written: {out / 'attack.json'}")
+
+
+def _print(cost: "AttackCost", settings: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    from vlnhijack.experiments.bench.attack import NAIVE_EPISODES, PAPER_ITERATIONS
+
+    table = Table(title=", ".join(f"{name} {value}" for name, value in settings.items()))
+    numbers = ("s per\niteration", *cost.rows[0].stages, "×\nnaive", "MB", "loss\nerror")
+    for name in ("vision", "policy", *numbers, "gradient\ncosine"):
+        table.add_column(name, justify="left" if name in ("vision", "policy") else "right")
+    for row in cost.rows:
+        table.add_row(
+            row.vision,
+            row.policy,
+            *(f"{seconds:.2f}" for seconds in (row.seconds, *row.stages.values())),
+            f"{cost.naive_seconds / row.seconds:.1f}",
+            f"{row.peak_memory_mb:.0f}",
+            f"{row.loss_error:.1e}",
+            f"{row.grad_cosine:.5f}",
+        )
+    console.print(table)
+    minutes = PAPER_ITERATIONS * cost.rows[-1].seconds / 60
+    console.print(
+        f"The default precision is that of the last row: {PAPER_ITERATIONS} iterations take "
+        f"{minutes:.0f} minutes. The naive way, float32, every episode with its own views and one "
+        f"step after the other, takes {cost.naive_seconds:.0f} s per iteration "
+        f"(from {NAIVE_EPISODES} episodes)."
+    )
