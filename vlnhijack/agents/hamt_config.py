@@ -44,7 +44,7 @@ class HamtConfig:
     feature_dropout: float = 0.4
 
     def __post_init__(self) -> None:
-        if self.hidden_size % self.num_attention_heads:
+        if self.num_attention_heads < 1 or self.hidden_size % self.num_attention_heads:
             raise InputError(
                 field="hidden_size",
                 expected=f"a multiple of num_attention_heads ({self.num_attention_heads})",

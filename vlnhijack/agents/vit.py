@@ -27,10 +27,10 @@ class VitConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "image_size", tuple(self.image_size))
-        if any(side % self.patch for side in self.image_size):
+        if self.patch < 1 or any(side % self.patch for side in self.image_size):
             expected = f"multiples of the patch size {self.patch}"
             raise InputError(field="image_size", expected=expected, received=self.image_size)
-        if self.dim % self.heads:
+        if self.heads < 1 or self.dim % self.heads:
             expected = f"a multiple of heads ({self.heads})"
             raise InputError(field="dim", expected=expected, received=self.dim)
 
@@ -38,6 +38,10 @@ class VitConfig:
     def grid(self) -> tuple[int, int]:
         """Rows and columns of patches."""
         return self.image_size[0] // self.patch, self.image_size[1] // self.patch
+
+    @property
+    def feature_size(self) -> int:
+        return self.dim
 
     def to_mapping(self) -> dict[str, Any]:
         return asdict(self)
@@ -69,7 +73,7 @@ class Attention(nn.Module):
 class Mlp(nn.Module):
     def __init__(self, config: VitConfig) -> None:
         super().__init__()
-        hidden = int(config.dim * config.mlp_ratio)
+        hidden = round(config.dim * config.mlp_ratio)
         self.fc1 = nn.Linear(config.dim, hidden)
         self.fc2 = nn.Linear(hidden, config.dim)
 
