@@ -1,5 +1,7 @@
 """Agents in our own form: a .safetensors file, a .json beside it, and maybe a tokenizer."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -120,7 +122,8 @@ def load_agent(path: Path) -> Agent:
     weights = _read_safetensors(path)
     tokenizer: Vocabulary | TokenizerFile | None = None
     if description.vocabulary is not None:
-        tokenizer = Vocabulary(description.vocabulary)
+        with _naming(path.with_suffix(".json")):
+            tokenizer = Vocabulary(description.vocabulary)
     elif description.tokenizer:
         tokenizer = TokenizerFile(_tokenizer_path(path))
     agent = Agent(
@@ -147,7 +150,17 @@ def record_metadata(path: Path, values: dict[str, Any]) -> None:
 def read_description(path: Path) -> Description:
     """All but the weights of the agent at `path`; InputError where it is missing or wrong."""
     file = path.with_suffix(".json")
-    return validated(_DESCRIPTION, artifacts.read_json(file), file)
+    with _naming(file):
+        return validated(_DESCRIPTION, artifacts.read_json(file), file)
+
+
+@contextmanager
+def _naming(file: Path) -> Iterator[None]:
+    """Errors of the block name the file, those of configurations too."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error).removeprefix(f"{file}: "), file=file) from None
 
 
 def _write_description(path: Path, description: Description) -> None:

@@ -1,8 +1,7 @@
 """CLIP's vision transformer (Radford et al., ICML 2021) with the names of OpenAI's `visual.*`."""
 
 from collections import OrderedDict
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
@@ -42,9 +41,6 @@ class ClipConfig:
     @property
     def patches(self) -> int:
         return (self.image_size[0] // self.patch) * (self.image_size[1] // self.patch)
-
-    def to_mapping(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class QuickGelu(nn.Module):

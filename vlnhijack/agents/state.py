@@ -22,8 +22,11 @@ def fill(make: Callable[[], Model], state: State, path: Path, prefix: str = "") 
     `path` and `prefix` complete the names in messages. Raises InputError for weights that are
     missing, unexpected or of another shape.
     """
-    with torch.device("meta"):
-        model = make()
+    try:
+        with torch.device("meta"):
+            model = make()
+    except RuntimeError as error:
+        raise InputError(f"not the sizes of a model ({error})", file=path) from None
     own = model.state_dict()
     for name in own.keys() & state.keys():
         if own[name].shape != state[name].shape:

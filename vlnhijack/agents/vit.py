@@ -1,7 +1,6 @@
 """Vision transformer (Dosovitskiy et al., ICLR 2021) with timm's parameter names."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
@@ -42,9 +41,6 @@ class VitConfig:
     @property
     def feature_size(self) -> int:
         return self.dim
-
-    def to_mapping(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class PatchEmbed(nn.Module):

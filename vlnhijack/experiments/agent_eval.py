@@ -82,8 +82,9 @@ def evaluate_in_houses(
     found: dict[str, Rates] = {}
     for folder in houses:
         house = load_house(house_folder(folder))
-        features = _encode(agent, house, rendering, progress)
         episodes = episodes_of(house, "val_seen")
+        agent.reader(episodes)
+        features = _encode(agent, house, rendering, progress)
         found[house.name] = rates(agent, observation_table([house.graph]), features, episodes)
     if record:
         known = agent.metadata.get("val_seen_by_house", {})

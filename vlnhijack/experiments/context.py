@@ -13,6 +13,7 @@ from torch import Tensor
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import (
     DrawnInstances,
     ExperimentConfig,
@@ -80,9 +81,29 @@ class Context:
 
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
-    """Load the agent and the houses that the experiment names."""
+    """Load the agent and the houses that the experiment names.
+
+    Raises InputError where the agent has no recorded rate in a house or cannot read its episodes.
+    """
     houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
-    return Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
+    agent = load_agent(agent_file(config.agent))
+    for house in houses.values():
+        recorded_rate(agent, house.name)
+        agent.reader(episodes_of(house, "val_seen"))
+    return Context(config, folder, progress, agent, houses)
+
+
+def recorded_rate(agent: Agent, scan: str) -> float:
+    """The clean success rate on val_seen of a house that is stored with the agent's weights."""
+    known = agent.metadata.get("val_seen_by_house", {})
+    if scan not in known:
+        raise InputError(
+            file=agent.path.with_suffix(".json"),
+            field="metadata.val_seen_by_house",
+            expected=f"the clean rate in {scan} (vlnhijack agent eval --house {scan} --record)",
+            received=", ".join(known) or "none",
+        )
+    return float(known[scan]["sr"])
 
 
 def house_list(wanted: list[PickedInstance] | DrawnInstances | StoredInstances) -> list[str]:

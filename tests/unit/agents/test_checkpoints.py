@@ -1,12 +1,15 @@
 """Agents in our own form."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 import safetensors.torch
 import torch
+from hypothesis import HealthCheck, given, settings
 
+from tests.fuzz import refused_or_read, texts
 from vlnhijack.agents.checkpoints import Agent, load_agent, record_metadata, save_agent
 from vlnhijack.agents.clip import ClipConfig, ClipVisual
 from vlnhijack.agents.encoder import VitEncoder
@@ -118,3 +121,20 @@ def test_damaged_agent_files_are_refused(agent_path: Path, suffix: str) -> None:
     agent_path.with_suffix(suffix).write_text("{}")
     with pytest.raises(InputError, match="small"):
         load_agent(agent_path)
+
+
+FUNCTION_SCOPED = [HealthCheck.function_scoped_fixture]
+DESCRIPTION = {
+    "hamt": asdict(CONFIG),
+    "vit": asdict(VIT),
+    "metadata": {},
+    "weights_sha256": "",
+    "vocabulary": ["[PAD]", "[UNK]", "[CLS]", "[SEP]"],
+}
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=FUNCTION_SCOPED)
+@given(texts(DESCRIPTION))
+def test_no_description_ends_in_a_traceback(agent_path: Path, content: bytes) -> None:
+    description_path = agent_path.with_suffix(".json")
+    refused_or_read(description_path, content, lambda _: load_agent(agent_path))
