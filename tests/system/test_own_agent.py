@@ -19,7 +19,12 @@ from vlnhijack.scenes.house_files import load_house
 from vlnhijack.settings import experiments_folder, house_folder
 
 HOUSE = "alder"
-SHORT = ("attack.iterations=2", "attack.checkpoint_every=2", "rendering.evaluation_spp=4")
+ATTACK = (
+    f"instances={{kind: single_step, houses: [{HOUSE}], count: 1}}",
+    "attack.iterations=2",
+    "attack.checkpoint_every=2",
+    "rendering.evaluation_spp=4",
+)
 
 
 @pytest.fixture(scope="module")
@@ -85,11 +90,11 @@ def test_the_converted_agent_reads_and_sees_the_same(own: Path, small: Agent) ->
 
 @pytest.mark.slow
 def test_it_is_measured_and_attacked(own: Path, small: Agent, tmp_path: Path) -> None:
-    sets = [part for setting in (*SHORT, f"agent={own}") for part in ("--set", setting)]
+    sets = [part for setting in (*ATTACK, f"agent={own}") for part in ("--set", setting)]
     run = ("run", experiments_folder() / "quickstart.yaml", *sets, "--out", tmp_path / "run")
     refused = command(*run)
     assert refused.returncode == 1
-    assert f"agent eval --house {HOUSE} --record" in refused.stderr
+    assert f"--house {HOUSE} --record" in refused.stderr
     assert not (tmp_path / "run").exists()
     done = command("agent", "eval", own, "--house", HOUSE, "--record", "--spp", "4", "--json")
     assert done.returncode == 0, done.stderr

@@ -1,7 +1,5 @@
 """Agents in our own form: a .safetensors file, a .json beside it, and maybe a tokenizer."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.reader import MAX_TOKENS, Reader, TokenizerFile
 from vlnhijack.agents.rollout import MAX_STEPS
-from vlnhijack.agents.state import State, fill
+from vlnhijack.agents.state import State, fill, naming
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.artifacts import validated
@@ -122,7 +120,7 @@ def load_agent(path: Path) -> Agent:
     weights = _read_safetensors(path)
     tokenizer: Vocabulary | TokenizerFile | None = None
     if description.vocabulary is not None:
-        with _naming(path.with_suffix(".json")):
+        with naming(path.with_suffix(".json")):
             tokenizer = Vocabulary(description.vocabulary)
     elif description.tokenizer:
         tokenizer = TokenizerFile(_tokenizer_path(path))
@@ -150,17 +148,8 @@ def record_metadata(path: Path, values: dict[str, Any]) -> None:
 def read_description(path: Path) -> Description:
     """All but the weights of the agent at `path`; InputError where it is missing or wrong."""
     file = path.with_suffix(".json")
-    with _naming(file):
+    with naming(file):
         return validated(_DESCRIPTION, artifacts.read_json(file), file)
-
-
-@contextmanager
-def _naming(file: Path) -> Iterator[None]:
-    """Errors of the block name the file, those of configurations too."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(str(error).removeprefix(f"{file}: "), file=file) from None
 
 
 def _write_description(path: Path, description: Description) -> None:

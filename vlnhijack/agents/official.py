@@ -14,7 +14,7 @@ from torch import Tensor
 from vlnhijack.agents.clip import ClipConfig, ClipVisual
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
-from vlnhijack.agents.state import State, blocks, fill, listed, shape
+from vlnhijack.agents.state import State, blocks, fill, listed, naming, shape
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.artifacts import validated
 from vlnhijack.errors import InputError
@@ -124,9 +124,8 @@ def sort_weights(state: State, path: Path) -> Checkpoint:
             whole = "end-to-end pretraining" if parts["policy"] and parts["vit"] else layout
             ignored = tuple(parts.pop("ignored"))
             return Checkpoint(path, whole, **parts, ignored=ignored)
-    raise InputError(
-        file=path, expected=f"a layout of {', '.join(_LAYOUTS)}", received=listed(state)
-    )
+    known = ", ".join(_LAYOUTS)
+    raise InputError(f"no known layout ({known}) with the weights {listed(state)}", file=path)
 
 
 def _sorted(state: State, places: Mapping[str, Part], path: Path) -> dict[str, dict[str, Tensor]]:
@@ -156,7 +155,8 @@ def _config(
     for name in [name for name in needed if name not in known]:
         expected = "to be given (--set), since the weights do not show it"
         raise InputError(file=path, field=f"{part}.{name}", expected=expected, received="nothing")
-    return validated(TypeAdapter(kind), dict(known), path, part)
+    with naming(path):
+        return validated(TypeAdapter(kind), dict(known), path, part)
 
 
 def _policy_sizes(state: State, path: Path) -> dict[str, Any]:
@@ -240,7 +240,7 @@ def _is_torchscript(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return any(Path(name).name == "constants.pkl" for name in archive.namelist())
-    except (OSError, zipfile.BadZipFile):
+    except Exception:  # on a damaged archive many kinds; `torch.load` says what is wrong
         return False
 
 

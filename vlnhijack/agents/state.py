@@ -1,6 +1,7 @@
 """Weights by name: put into a model, or refused with names and shapes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,8 +20,8 @@ def fill(make: Callable[[], Model], state: State, path: Path, prefix: str = "") 
     """The model that `make` gives with the weights of `state` in float32, frozen and in
     evaluation mode.
 
-    `path` and `prefix` complete the names in messages. Raises InputError for weights that are
-    missing, unexpected or of another shape.
+    `path` and `prefix` complete the names in messages. Raises InputError for sizes that no model
+    has, and for weights that are missing, unexpected or of another shape.
     """
     try:
         with torch.device("meta"):
@@ -62,3 +63,12 @@ def blocks(state: State, prefix: str) -> int:
     """How many blocks `<prefix><number>.…` there are."""
     names = (name.removeprefix(prefix) for name in state if name.startswith(prefix))
     return len({name.partition(".")[0] for name in names})
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Errors of the block name the file, those of configurations too."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error).removeprefix(f"{file}: "), file=file) from None

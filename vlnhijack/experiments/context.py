@@ -96,11 +96,12 @@ def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> 
 def recorded_rate(agent: Agent, scan: str) -> float:
     """The clean success rate on val_seen of a house that is stored with the agent's weights."""
     known = agent.metadata.get("val_seen_by_house", {})
+    command = f"vlnhijack agent eval {agent.path} --house {scan} --record"
     if scan not in known:
         raise InputError(
             file=agent.path.with_suffix(".json"),
             field="metadata.val_seen_by_house",
-            expected=f"the clean rate in {scan} (vlnhijack agent eval --house {scan} --record)",
+            expected=f"the clean rate in {scan} ({command})",
             received=", ".join(known) or "none",
         )
     return float(known[scan]["sr"])

@@ -143,7 +143,7 @@ def test_unexpected_weights_are_listed_with_their_shapes(tmp_path: Path) -> None
     expected = r"unexpected weights obj_linear\.bias \(4,\), og_head\.net\.0\.weight \(2, 3\)"
     with pytest.raises(InputError, match=expected):
         read_checkpoint(saved(state | other, tmp_path))
-    with pytest.raises(InputError, match=r"a layout of .*og_head\.net\.0\.weight \(2, 3\)"):
+    with pytest.raises(InputError, match=r"no known layout .*og_head\.net\.0\.weight \(2, 3\)"):
         read_checkpoint(saved(other, tmp_path))
 
 
@@ -192,19 +192,20 @@ def contents(*, legacy: bool) -> bytes:
     return whole.getvalue()
 
 
-WHOLE = [contents(legacy=legacy) for legacy in (False, True)]
+WHOLE = {"zip": contents(legacy=False), "legacy": contents(legacy=True)}
 
 
 @settings(max_examples=80, deadline=None)
 @given(
-    st.sampled_from(WHOLE),
+    st.sampled_from(sorted(WHOLE)),
     st.integers(0, 10**6),
     st.binary(min_size=1, max_size=16),
     st.booleans(),
 )
 def test_no_file_ends_in_a_traceback(
-    folder: Path, whole: bytes, at: int, junk: bytes, cut: bool
+    folder: Path, form: str, at: int, junk: bytes, cut: bool
 ) -> None:
+    whole = WHOLE[form]
     at %= len(whole)
     content = whole[:at] if cut else whole[:at] + junk + whole[at + len(junk) :]
 
