@@ -153,7 +153,7 @@ def read_description(path: Path) -> Description:
 
 
 def _write_description(path: Path, description: Description) -> None:
-    artifacts.write_json(path.with_suffix(".json"), description.model_dump(exclude_none=True))
+    artifacts.write_json(path.with_suffix(".json"), description.model_dump())
 
 
 def _load_vision(description: Description, weights: State, path: Path) -> VitEncoder | None:

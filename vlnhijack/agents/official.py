@@ -66,11 +66,13 @@ class Checkpoint:
 
     def variant(self) -> Variant | None:
         """The official agent with a vocabulary of that size; None where there is none."""
-        words = shape(self.policy, "embeddings.word_embeddings.weight", 2, self.path)[0]
-        return _VARIANT_OF_WORDS.get(words)
+        return _VARIANT_OF_WORDS.get(self.policy_sizes()["vocab_size"])
 
     def policy_sizes(self) -> dict[str, Any]:
-        """What the weights show of a HamtConfig."""
+        """What the weights show of a HamtConfig; InputError where there is no policy."""
+        if not self.policy:
+            expected = "an agent or a pretraining of HAMT"
+            raise InputError(file=self.path, expected=expected, received=self.layout)
         return _policy_sizes(self.policy, self.path)
 
     def vision_sizes(self) -> dict[str, Any]:

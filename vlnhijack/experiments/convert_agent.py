@@ -1,5 +1,6 @@
 """From the official checkpoints to an agent that every command takes."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,24 +55,18 @@ def convert_agent(
     config = source.policy_config(variant, settings.policy)
     seeing = source if vision is None else read_checkpoint(vision)
     tokens, steps = _LIMITS[variant]
+    reader = Reader(
+        None if tokenizer is None else TokenizerFile(tokenizer),
+        config.vocab_size,
+        settings.max_tokens or min(tokens, config.max_position_embeddings),
+    )
     files = {"policy": checkpoint, "vision": vision, "tokenizer": tokenizer}
+    metadata = {"version": __version__, "variant": variant, "converted_from": _origins(files)}
     agent = Agent(
         _encoder(seeing, settings) if vision is not None or source.vit else None,
         source.load_policy(config),
-        Reader(
-            None if tokenizer is None else TokenizerFile(tokenizer),
-            config.vocab_size,
-            settings.max_tokens or min(tokens, config.max_position_embeddings),
-        ),
-        {
-            "version": __version__,
-            "variant": variant,
-            "converted_from": {
-                part: {"file": file.name, "sha256": sha256(file)}
-                for part, file in files.items()
-                if file is not None
-            },
-        },
+        reader,
+        metadata,
         out,
         settings.max_steps or steps,
     )
@@ -110,6 +105,14 @@ def _own_info(file: Path) -> dict[str, Any]:
         **found,
         **{name: metadata[name] for name in known if name in metadata},
         "recorded_sr": {house: rates["sr"] for house, rates in recorded.items()},
+    }
+
+
+def _origins(files: Mapping[str, Path | None]) -> dict[str, dict[str, str]]:
+    return {
+        part: {"file": file.name, "sha256": sha256(file)}
+        for part, file in files.items()
+        if file is not None
     }
 
 
