@@ -161,6 +161,7 @@ def test_wrong_names_and_shapes_are_listed(tmp_path: Path) -> None:
         found.load_policy(CONFIG)
 
 
+@pytest.mark.filterwarnings("ignore:.*torch.jit.script.*:DeprecationWarning")
 def test_an_archive_with_code_is_refused_with_the_way_out(tmp_path: Path) -> None:
     torch.jit.script(torch.nn.Linear(2, 2)).save(str(tmp_path / "ViT-B-32.pt"))
     with pytest.raises(InputError, match=r"ViT-B-32\.pt: a TorchScript archive.*state_dict\(\)"):
