@@ -58,7 +58,7 @@ class Walk:
     def __init__(self, world: World, episode: Episode) -> None:
         self.world, self.episode = world, episode
         self.policy = world.agent.policy
-        self.ids = torch.tensor([world.agent.vocabulary.encode(episode.instruction, 60)])
+        self.ids = torch.tensor([world.agent.reader.read(episode)])
         self.read = torch.ones_like(self.ids, dtype=torch.bool)
         self.text = self.policy.encode_text(self.ids, self.read)
         self.history = [self.policy.history_cls(1)]

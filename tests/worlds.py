@@ -13,6 +13,7 @@ from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.agents.reader import Reader
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.navigation.episode import Episode
@@ -64,4 +65,5 @@ def tiny_agent(*, no_lang_ca: bool = False, seed: int = 0, scale: float = 0.3) -
         policy.next_action.net[4].weight *= 8
     for model in (encoder, policy):
         model.eval().requires_grad_(False)
-    return Agent(encoder, policy, vocabulary, {}, Path("tiny.safetensors"))
+    reader = Reader(vocabulary, len(vocabulary))
+    return Agent(encoder, policy, reader, {}, Path("tiny.safetensors"))

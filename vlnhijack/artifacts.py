@@ -144,25 +144,52 @@ def stream_json_list(path: Path) -> Iterator[Any]:
     Raises InputError where the file is not a list of items of at most 64 Mi characters.
     """
     with open_text(path) as file:
-        reader = _ListReader(file, path)
-        reader.expect("[")
-        if reader.peek() == "]":
-            reader.expect("]")
+        reader = _JsonReader(file, path, "list")
+        for number, _ in enumerate(reader.places("[", "]"), 1):
+            item = reader.item()
+            reader.where = f"record {number}"
+            yield item
+
+
+def stream_json_object(path: Path) -> Iterator[tuple[str, Any]]:
+    """The keys and values of a JSON object; the same otherwise. Each key may come once."""
+    known: set[str] = set()
+    with open_text(path) as file:
+        reader = _JsonReader(file, path, "object")
+        for _ in reader.places("{", "}"):
+            key = reader.item()
+            if not isinstance(key, str) or key in known:
+                expected = "a text that is no key yet"
+                raise InputError(file=path, field=reader.where, expected=expected, received=key)
+            known.add(key)
+            reader.where = key
+            reader.expect(":")
+            yield key, reader.item()
+
+
+class _JsonReader:
+    """Cuts a JSON list or object (`kind`) into items while its text is read piece by piece.
+
+    where: the place in the file that errors name.
+    """
+
+    def __init__(self, file: TextIO, path: Path, kind: str) -> None:
+        self._file, self._path, self._kind = file, path, kind
+        self._text, self._at, self.where = "", 0, "record 0"
+        self._decoder = json.JSONDecoder(object_pairs_hook=self._unique)
+
+    def places(self, opening: str, closing: str) -> Iterator[None]:
+        """Stop before each item; at last, go past the end, which is that of the file."""
+        self.expect(opening)
+        if self.peek() == closing:
+            self.expect(closing)
         else:
-            yield reader.item()
-            while reader.expect(",]") == ",":
-                yield reader.item()
-        if reader.peek():
-            raise InputError(file=path, expected="nothing after the list", received=reader.peek())
-
-
-class _ListReader:
-    """Cuts a JSON list into items while its text is read piece by piece."""
-
-    def __init__(self, file: TextIO, path: Path) -> None:
-        self._file, self._path = file, path
-        self._text, self._at, self._items = "", 0, 0
-        self._decoder = json.JSONDecoder()
+            yield
+            while self.expect("," + closing) == ",":
+                yield
+        if self.peek():
+            expected = f"nothing after the {self._kind}"
+            raise InputError(file=self._path, expected=expected, received=self.peek())
 
     def peek(self) -> str:
         """The next character that is not white space, "" at the end."""
@@ -178,8 +205,8 @@ class _ListReader:
         if not found or found not in allowed:
             raise InputError(
                 file=self._path,
-                field=f"record {self._items}" if self._items else None,
-                expected=f"a JSON list with {' or '.join(allowed)} here",
+                field=self.where,
+                expected=f"a JSON {self._kind} with {' or '.join(allowed)} here",
                 received=found or "the end of the file",
             )
         self._at += 1
@@ -193,13 +220,22 @@ class _ListReader:
                 value, end = self._decoder.raw_decode(self._text, self._at)
                 length = end - self._at
                 if len(self._text) - end >= _TAIL or not self._more():
-                    self._at, self._items = self._at + length, self._items + 1
+                    self._at += length
                     return value
             except (ValueError, RecursionError) as error:
                 if len(self._text) - self._at > _LONGEST_ITEM or not self._more():
                     raise InputError(
-                        f"not valid JSON ({error})", file=self._path, field=f"record {self._items}"
+                        f"not valid JSON ({error})", file=self._path, field=self.where
                     ) from None
+
+    def _unique(self, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            twice = next(key for key in found if sum(key == other for other, _ in pairs) > 1)
+            raise InputError(
+                file=self._path, field=self.where, expected="each key once", received=twice
+            )
+        return found
 
     def _more(self) -> bool:
         """Read on, at least as much as is left, so that a long item costs linear time."""

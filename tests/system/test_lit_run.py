@@ -1,6 +1,7 @@
 """A whole run in a tiny lit house: rate recorded, light renewed, attacked, checked, evaluated."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ def agent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for split, paths in (("train", TRAIN), ("val_seen", TEST)):
         save_episodes(folder / "episodes" / f"{split}.json", episodes(paths))
     tiny = tiny_agent()
-    save_agent(tmp_path / "tiny.safetensors", tiny.encoder.vit, tiny.policy, tiny.vocabulary, {})
+    save_agent(replace(tiny, path=tmp_path / "tiny.safetensors", metadata={}))
     yield tmp_path / "tiny.safetensors"
     torch.use_deterministic_algorithms(False)
 
@@ -88,9 +89,9 @@ def test_a_lit_house_is_attacked_under_renewed_light(
     agent: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     progress = Progress(disable=True)
-    with pytest.raises(InputError, match=f"vlnhijack agent eval --record {HOUSE.name}"):
+    with pytest.raises(InputError, match=f"--house {HOUSE.name} --record"):
         run(config(agent), tmp_path / "refused", resume=False, progress=progress)
-    options = ["--record", HOUSE.name, "--spp", "4"]
+    options = ["--house", HOUSE.name, "--record", "--spp", "4"]
     done = CliRunner().invoke(app, ["agent", "eval", str(agent), *options])
     assert done.exit_code == 0, done.output
     assert read_json(agent.with_suffix(".json"))["metadata"]["val_seen_by_house"][HOUSE.name]["n"]

@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from vlnhijack.agents.checkpoints import load_hamt, load_vit
+from vlnhijack.agents.clip import ClipVisual
+from vlnhijack.agents.encoder import CLIP, TIMM, Preprocessing, normalise
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
-from vlnhijack.agents.vit import VitConfig
+from vlnhijack.agents.official import read_checkpoint, sort_weights
+from vlnhijack.agents.vit import VisionTransformer
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 REFERENCE = Path(os.environ.get("VLNHIJACK_REFERENCE", SHARED / "reference")) / "hamt"
@@ -34,6 +35,10 @@ def config(name: str) -> HamtConfig:
     return HamtConfig.from_mapping(
         json.loads((REFERENCE / "config.json").read_text())[name]["model"]
     )
+
+
+def policy_of(path: Path, name: str) -> Hamt:
+    return read_checkpoint(path).load_policy(config(name))
 
 
 def arrays(name: str) -> dict[str, np.ndarray]:
@@ -72,7 +77,11 @@ def replay(
         yield from ((f"s{t}_logits", logits), (f"s{t}_logits", full.logits))
         yield from ((f"s{t}_txt_out", full.text), (f"s{t}_hist_out", full.history))
         yield f"s{t}_ob_out", full.observation
-        loss = loss + F.cross_entropy(logits, given[f"s{t}_target"], reduction="sum")
+        state = full.history[:, 0]
+        yield f"s{t}_state", state if policy.config.no_lang_ca else state * full.text[:, 0]
+        step_loss = F.cross_entropy(logits, given[f"s{t}_target"], reduction="sum")
+        yield f"s{t}_ce_sum", step_loss
+        loss = loss + step_loss
         if t < int(given["n_history"]):
             names = ("img_feats", "ang_feats", "pano_img_feats", "pano_ang_feats")
             taken = [given[f"h{t}_hist_{part}"] for part in names]
@@ -97,7 +106,7 @@ def relative_error(received: Tensor, expected: np.ndarray) -> float:
 @each_dtype
 @each_agent
 def test_every_output_matches(name: str, dtype: torch.dtype) -> None:
-    policy = load_hamt(REFERENCE / f"{name}_agent_ckpt.pt", config(name)).to(dtype)
+    policy = policy_of(REFERENCE / f"{name}_agent_ckpt.pt", name).to(dtype)
     expected = arrays(f"{name}_outputs")
     prefix = "" if dtype == torch.float32 else "f64_"
     seen = set()
@@ -106,15 +115,14 @@ def test_every_output_matches(name: str, dtype: torch.dtype) -> None:
             assert_close(value, expected[prefix + key], TOLERANCE[dtype], key)
             seen.add(prefix + key)
     unchecked = {key for key in expected if key.startswith("f64_") == bool(prefix)} - seen
-    critic_or_parts = {"state", "value", "sum"}
-    assert {key.rsplit("_", 1)[1] for key in unchecked} <= critic_or_parts
+    assert {key.rsplit("_", 1)[1] for key in unchecked} <= {"value"}, "all but the critic's"
 
 
 @pytest.mark.parametrize("detach", [False, True], ids=["fixhist0", "fixhist1"])
 @each_dtype
 @each_agent
 def test_every_gradient_matches(name: str, dtype: torch.dtype, detach: bool) -> None:
-    policy = load_hamt(REFERENCE / f"{name}_agent_ckpt.pt", config(name)).to(dtype)
+    policy = policy_of(REFERENCE / f"{name}_agent_ckpt.pt", name).to(dtype)
     given = inputs(name, dtype)
     dict(replay(policy, given, detach))["loss_sum"].backward()
     prefix, rows = ("g_", slice(None)) if dtype == torch.float32 else ("g64b0_", slice(0, 1))
@@ -136,7 +144,7 @@ def test_both_layouts_hold_the_same_policy(name: str, tmp_path: Path) -> None:
     content["vln_bert"]["state_dict"] = {f"module.{key}": value for key, value in state.items()}
     torch.save(content, tmp_path / "parallel.pt")
     paths = agent_path, REFERENCE / f"{name}_pretrain_ckpt.pt", tmp_path / "parallel.pt"
-    first, *others = (load_hamt(path, config(name)).state_dict() for path in paths)
+    first, *others = (policy_of(path, name).state_dict() for path in paths)
     for other in others:
         assert all(torch.equal(first[key], other[key]) for key in first)
 
@@ -144,55 +152,78 @@ def test_both_layouts_hold_the_same_policy(name: str, tmp_path: Path) -> None:
 def test_end_to_end_layout_holds_policy_and_vit() -> None:
     path = REFERENCE / "e2e_pretrain_ckpt.pt"
     content = torch.load(path, weights_only=True)
-    features = content["bert.img_embeddings.img_linear.weight"].shape[1]
-    policy = load_hamt(path, replace(config("r2r"), image_feat_size=features)).state_dict()
+    found = read_checkpoint(path)
+    assert found.layout == "end-to-end pretraining"
+    policy = found.load_policy(found.policy_config("r2r", {"num_attention_heads": 1})).state_dict()
     for key, tensor in policy.items():
         stored = key if key.startswith("next_action.") else f"bert.{key}"
         assert torch.equal(tensor, content[stored]), key
-    vit = load_vit(path, vit_config(content, "bert.vision_backbone.")).state_dict()
+    vit = found.load_vision(found.vision_config({"heads": 1})).state_dict()
     for key, tensor in vit.items():
         assert torch.equal(tensor, content[f"bert.vision_backbone.{key}"]), key
 
 
-@pytest.mark.parametrize("name", ["r2r_agent", "rxr_agent"])
-def test_official_full_size_keys(name: str) -> None:
-    keys = json.loads((REFERENCE / "full_keys_agent.json").read_text())[name]
-    shapes = {key.removeprefix("vln_bert."): tuple(shape) for key, shape in keys.items()}
-    words, size = shapes["embeddings.word_embeddings.weight"]
-    full = HamtConfig(
-        hidden_size=size,
-        vocab_size=words,
-        max_position_embeddings=shapes["embeddings.position_embeddings.weight"][0],
-        image_feat_size=shapes["img_embeddings.img_linear.weight"][1],
-        no_lang_ca=name.startswith("rxr"),
-    )
-    with torch.device("meta"):
-        policy = Hamt(full)
-    assert {key: tuple(value.shape) for key, value in policy.state_dict().items()} == shapes
+@each_agent
+def test_sizes_are_read_from_the_weights(name: str) -> None:
+    hidden = ("num_attention_heads", "layer_norm_eps", "no_lang_ca")
+    options = {option: getattr(config(name), option) for option in hidden}
+    for layout in ("agent", "pretrain"):
+        found = read_checkpoint(REFERENCE / f"{name}_{layout}_ckpt.pt")
+        assert found.policy_config("r2r", options) == config(name)
 
 
-def vit_config(state: dict[str, Tensor], prefix: str = "") -> VitConfig:
-    """Sizes of the recorded ViT, the patch size from its weights."""
-    recorded = arrays("vit")
-    return VitConfig(
-        image_size=recorded["images_u8"].shape[-2:],
-        patch=state[f"{prefix}patch_embed.proj.weight"].shape[-1],
-        dim=int(recorded["embed_dim"]),
-        depth=int(recorded["depth"]),
-        heads=int(recorded["num_heads"]),
-    )
+def full_size_layouts() -> dict[str, dict[str, list[int]]]:
+    files = [REFERENCE / f"full_keys_{kind}.json" for kind in ("agent", "vision_pretrain")]
+    layouts = {name: keys for file in files for name, keys in json.loads(file.read_text()).items()}
+    layouts.pop("critic")
+    return layouts
 
 
-def test_vit_features_and_gradients_match() -> None:
-    path = REFERENCE / "vit_ckpt.pt"
-    recorded = arrays("vit")
-    vit = load_vit(path, vit_config(torch.load(path, weights_only=True)["state_dict"]))
-    images = (torch.from_numpy(recorded["images_u8"]) / 255 * 2 - 1).requires_grad_()
-    features = vit(images)
+def test_every_official_full_size_file_fits_as_it_is() -> None:
+    """Names, shapes and the number of heads, of which weights show nothing."""
+    policies, encoders = 0, 0
+    for name, shapes in full_size_layouts().items():
+        state = {key: torch.empty(shape, device="meta") for key, shape in shapes.items()}
+        found = sort_weights(state, Path(name))
+        if found.policy:
+            variant = found.variant()
+            assert variant == name.partition("_")[0]
+            found.load_policy(found.policy_config(variant, {}))
+            policies += 1
+        if found.vit or found.clip:
+            found.load_vision(found.vision_config({}))
+            encoders += 1
+    assert policies >= 4
+    assert encoders >= 2
+
+
+def vision(name: str) -> tuple[VisionTransformer | ClipVisual, dict[str, np.ndarray]]:
+    """A recorded image encoder with its sizes, and what was recorded."""
+    recorded = arrays(name)
+    found = read_checkpoint(REFERENCE / f"{name}_ckpt.pt")
+    heads = recorded["num_heads" if name == "vit" else "heads"]
+    size = recorded["images_u8"].shape[-2:]
+    model = found.load_vision(found.vision_config({"heads": int(heads), "image_size": size}))
+    depth = {"dim": "embed_dim", "depth": "depth"}
+    if name == "clip":
+        depth = {option: option for option in ("width", "layers", "out", "patch")}
+    for option, key in depth.items():
+        assert getattr(model.config, option) == int(recorded[key]), option
+    return model, recorded
+
+
+@pytest.mark.parametrize(("name", "how"), [("vit", TIMM), ("clip", CLIP)])
+def test_image_features_and_gradients_match(name: str, how: Preprocessing) -> None:
+    model, recorded = vision(name)
+    images = torch.from_numpy(recorded["images_u8"]) / 255
+    images = normalise(images, how).requires_grad_()
+    features = model(images)
     assert_close(features, recorded["features"], 1e-5, "features")
-    assert_close(vit.forward_tokens(images)[:, 0], recorded["features"], 1e-5, "tokens")
     (features * torch.from_numpy(recorded["loss_weight"])).sum().backward()
     assert images.grad is not None
     assert relative_error(images.grad, recorded["g_images"]) <= 1e-5
-    exact = vit.double()(images.detach().double())
-    assert_close(exact, recorded["f64_features"], 1e-6, "float64 features")
+    if isinstance(model, VisionTransformer):
+        assert_close(model.forward_tokens(images)[:, 0], recorded["features"], 1e-5, "tokens")
+    if "f64_features" in recorded:
+        exact = model.double()(images.detach().double())
+        assert_close(exact, recorded["f64_features"], 1e-6, "float64 features")

@@ -3,7 +3,8 @@
 import gzip
 import json
 import os
-import tarfile
+from collections import ChainMap
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 from vlnhijack.errors import InputError
 from vlnhijack.navigation.candidates import candidates
 from vlnhijack.navigation.episode import load_episodes, save_episodes
-from vlnhijack.navigation.graph import NavigationGraph, load_graph
+from vlnhijack.navigation.graph import GraphFolder, NavigationGraph, load_graph
 from vlnhijack.navigation.metrics import path_metrics
 from vlnhijack.navigation.views import VIEWS, angle_features, view_angles
 
@@ -45,13 +46,11 @@ def read(name: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def connectivity(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def graphs() -> Mapping[str, NavigationGraph]:
+    """Those of the public data set, and those of the reference itself."""
     if not DATA.is_file():
         pytest.skip(f"no connectivity graphs at {DATA} (VLNHIJACK_DATA)")
-    folder = tmp_path_factory.mktemp("r2r")
-    with tarfile.open(DATA) as archive:
-        archive.extractall(folder, filter="data")
-    return next(folder.rglob("*_connectivity.json")).parent
+    return ChainMap(GraphFolder(REFERENCE), GraphFolder(DATA))
 
 
 def test_views_have_the_simulator_s_angles() -> None:
@@ -69,15 +68,15 @@ def test_angle_features_are_bit_exact() -> None:
     assert np.array_equal(ours, reference)
 
 
-def test_candidates_match(connectivity: Path) -> None:
+def test_candidates_match(graphs: Mapping[str, NavigationGraph]) -> None:
     for scan, viewpoints in read("candidates.json.gz").items():
-        ours = candidates(load_graph(connectivity, scan))
+        ours = candidates(graphs[scan])
         assert set(viewpoints) <= set(ours)
         for viewpoint, expected in viewpoints.items():
             found = ours[viewpoint]
             where = f"{scan} {viewpoint}"
-            assert [(c.viewpoint, c.point_id) for c in found] == [
-                (e["viewpointId"], e["pointId"]) for e in expected
+            assert [(c.viewpoint, c.point_id, c.idx) for c in found] == [
+                (e["viewpointId"], e["pointId"], e["idx"]) for e in expected
             ], where
             for field, name in (
                 ("heading", "normalized_heading"),
@@ -97,10 +96,8 @@ def check_scores(graph: NavigationGraph, record: dict[str, Any]) -> None:
         assert got == pytest.approx(want, abs=1e-9, nan_ok=True), (record["kind"], ours)
 
 
-def test_metrics_match(connectivity: Path) -> None:
-    records = read("metrics.json.gz")
-    graphs = {scan: load_graph(connectivity, scan) for scan in {r["scan"] for r in records}}
-    for record in records:
+def test_metrics_match(graphs: Mapping[str, NavigationGraph]) -> None:
+    for record in read("metrics.json.gz"):
         check_scores(graphs[record["scan"]], record)
 
 
@@ -114,13 +111,14 @@ def test_metrics_at_the_edges_match_or_explain() -> None:
             check_scores(graph, record)
 
 
-def test_room_to_room_loads_unchanged(connectivity: Path, tmp_path: Path) -> None:
+def test_room_to_room_loads_unchanged(
+    graphs: Mapping[str, NavigationGraph], tmp_path: Path
+) -> None:
     source, file = R2R / "R2R_val_seen.json.gz", tmp_path / "R2R_val_seen.json"
     if not source.is_file():
         pytest.skip(f"no Room-to-Room episodes at {source} (VLNHIJACK_DATA)")
     file.write_bytes(gzip.decompress(source.read_bytes()))
     records = json.loads(file.read_text())
-    graphs = {scan: load_graph(connectivity, scan) for scan in {r["scan"] for r in records}}
     episodes = load_episodes(file, graphs)
     assert [e.instruction for e in episodes] == [t for r in records for t in r["instructions"]]
     save_episodes(tmp_path / "again.json", episodes)

@@ -1,4 +1,4 @@
-"""JSON lists and lines, read piece by piece."""
+"""JSON lists, objects and lines, read piece by piece."""
 
 import gzip
 import json
@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from tests.fuzz import VALUES, refused_or_read, texts
 from vlnhijack import artifacts
-from vlnhijack.artifacts import read_json, stream_json_lines, stream_json_list
+from vlnhijack.artifacts import (
+    read_json,
+    stream_json_lines,
+    stream_json_list,
+    stream_json_object,
+)
 from vlnhijack.errors import InputError
 
 LISTS = st.lists(VALUES, max_size=6)
@@ -31,6 +36,9 @@ def test_a_list_is_the_same_whatever_the_pieces(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(artifacts, "_CHUNK", chunk)
         assert repr(list(stream_json_list(file))) == repr(json.loads(file.read_text()))
+        named = {str(number): value for number, value in enumerate(values)}
+        file.write_text(json.dumps(named, indent=indent))
+        assert repr(dict(stream_json_object(file))) == repr(json.loads(file.read_text()))
 
 
 @settings(max_examples=80, deadline=None)
@@ -40,6 +48,7 @@ def test_any_other_file_is_refused_in_one_line(file: Path, content: bytes, chunk
         patch.setattr(artifacts, "_CHUNK", chunk)
         patch.setattr(artifacts, "_LONGEST_ITEM", 200)
         refused_or_read(file, content, lambda path: list(stream_json_list(path)))
+        refused_or_read(file, content, lambda path: list(stream_json_object(path)))
         refused_or_read(file, content, lambda path: list(stream_json_lines(path)))
 
 
@@ -58,6 +67,23 @@ def test_what_is_wrong_with_a_list_is_said(file: Path, text: str, expected: str)
     file.write_text(text)
     with pytest.raises(InputError, match=expected):
         list(stream_json_list(file))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[1]", "expected a JSON object with { here"),
+        ("{1: 2}", "expected a text that is no key yet, received 1"),
+        ('{"a" 2}', "a: expected a JSON object with : here"),
+        ('{"a": 1, "a": 2}', "a: expected a text that is no key yet, received 'a'"),
+        ('{"a": {"b": 1, "b": 2}}', "a: expected each key once, received 'b'"),
+        ('{"a": 1', "a: expected a JSON object with , or }"),
+    ],
+)
+def test_what_is_wrong_with_an_object_is_said(file: Path, text: str, expected: str) -> None:
+    file.write_text(text)
+    with pytest.raises(InputError, match=expected):
+        list(stream_json_object(file))
 
 
 def test_only_a_piece_is_read_for_the_first_item(

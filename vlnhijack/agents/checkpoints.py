@@ -1,90 +1,114 @@
-"""Reads the official checkpoint layouts; writes and reads the small agent's own files."""
+"""Agents in our own form: a .safetensors file, a .json beside it, and maybe a tokenizer."""
 
-import pickle
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import safetensors
 import safetensors.torch
-import torch
-from torch import Tensor, nn
+from pydantic import BaseModel, PositiveInt, TypeAdapter
 
 from vlnhijack import artifacts
+from vlnhijack.agents.clip import ClipConfig, ClipVisual
 from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
+from vlnhijack.agents.reader import MAX_TOKENS, Reader, TokenizerFile
+from vlnhijack.agents.rollout import MAX_STEPS
+from vlnhijack.agents.state import State, fill, naming
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
+from vlnhijack.artifacts import validated
 from vlnhijack.errors import InputError
 
-_MODULE = "module."
-_BACKBONE = "bert.vision_backbone."
-_HAMT_PREFIXES = ("vln_bert.", "bert.")
-_PRETRAINING_HEADS = ("mlm_head", "regress_action", "sprel_head", "image_classifier", "itm_head")
-_SHOWN = 5
-
-State = dict[str, Tensor]
-Model = TypeVar("Model", bound=nn.Module)
+_ANGLES = 4
 
 
 @dataclass(frozen=True)
 class Agent:
-    """A trained agent. `metadata` holds its measured clean rates and its provenance."""
+    """An agent. `vision` is its image encoder, if it has one; `max_steps` bounds its own moves;
+    `metadata` holds its measured clean rates and its provenance.
 
-    encoder: VitEncoder
+    Raises InputError where its parts do not fit each other.
+    """
+
+    vision: VitEncoder | None
     policy: Hamt
-    vocabulary: Vocabulary
+    reader: Reader
     metadata: dict[str, Any]
     path: Path
+    max_steps: int = MAX_STEPS
+
+    def __post_init__(self) -> None:
+        config = self.policy.config
+        size = config.image_feat_size if self.vision is None else self.vision.feature_size
+        known = config.max_position_embeddings
+        for field, fits, expected, received in (
+            ("image_feat_size", config.image_feat_size == size, size, config.image_feat_size),
+            ("angle_feat_size", config.angle_feat_size == _ANGLES, _ANGLES, config.angle_feat_size),
+            ("max_tokens", self.reader.max_tokens <= known, f"≤ {known}", self.reader.max_tokens),
+        ):
+            if not fits:
+                raise InputError(file=self.path, field=field, expected=expected, received=received)
+
+    @property
+    def encoder(self) -> VitEncoder:
+        """The image encoder; InputError where the agent has none."""
+        if self.vision is None:
+            raise InputError(
+                file=self.path,
+                expected="an agent with an image encoder (vlnhijack agent convert --vision)",
+                received="one without",
+            )
+        return self.vision
 
 
-def load_hamt(path: Path, config: HamtConfig) -> Hamt:
-    """The policy, frozen and in evaluation mode, from any of HAMT's official layouts.
+class Description(BaseModel):
+    """The .json beside the weights; without vit and clip the agent reads stored features alone."""
 
-    Agent ({'vln_bert': {'state_dict'}}), pretraining and end-to-end pretraining (flat). Pretraining
-    heads and the vision backbone are ignored. Raises InputError for anything else that is missing,
-    unexpected or of another shape.
-    """
-    content = _read_torch(path)
-    state = _tensors(content.get("vln_bert", content), path)
-    ignored = (_BACKBONE, *(f"{head}." for head in _PRETRAINING_HEADS))
-    state = {
-        _strip(name, *_HAMT_PREFIXES): tensor
-        for name, tensor in state.items()
-        if not name.startswith(ignored)
+    hamt: HamtConfig
+    vit: VitConfig | None = None
+    clip: ClipConfig | None = None
+    image_size: tuple[PositiveInt, PositiveInt] | None = None
+    max_tokens: PositiveInt = MAX_TOKENS
+    max_steps: PositiveInt = MAX_STEPS
+    metadata: dict[str, Any]
+    weights_sha256: str
+    tokenizer: bool = False
+    vocabulary: tuple[str, ...] | None = None
+
+
+_DESCRIPTION = TypeAdapter(Description)
+
+
+def save_agent(agent: Agent) -> None:
+    """Writes `agent.path` (.safetensors) and, beside it, a .json with all but the weights, and the
+    tokenizer of a `TokenizerFile` as .tokenizer.json."""
+    path, tokenizer = agent.path, agent.reader.tokenizer
+    vit = None if agent.vision is None else agent.vision.vit
+    parts = {"hamt": agent.policy, "clip" if isinstance(vit, ClipVisual) else "vit": vit}
+    weights = {
+        f"{part}.{name}": tensor.cpu().contiguous()
+        for part, model in parts.items()
+        if model is not None
+        for name, tensor in model.state_dict().items()
     }
-    return _fill(Hamt(config), state, path)
-
-
-def load_vit(path: Path, config: VitConfig) -> VisionTransformer:
-    """The ViT, frozen and in evaluation mode, from timm's keys or from an end-to-end pretraining
-    checkpoint of HAMT; the classification head is ignored. Raises InputError as `load_hamt`."""
-    state = _tensors(_read_torch(path), path)
-    if any(name.startswith(_BACKBONE) for name in state):
-        state = {name: tensor for name, tensor in state.items() if name.startswith(_BACKBONE)}
-    state = {_strip(name, _BACKBONE): tensor for name, tensor in state.items()}
-    state = {name: tensor for name, tensor in state.items() if not name.startswith("head.")}
-    return _fill(VisionTransformer(config), state, path)
-
-
-def save_agent(
-    path: Path, vit: VisionTransformer, hamt: Hamt, vocabulary: Vocabulary, metadata: dict[str, Any]
-) -> None:
-    """Writes `path` (a .safetensors file) and, beside it, a .json with all but the weights."""
-    weights = {f"vit.{name}": tensor for name, tensor in vit.state_dict().items()}
-    weights |= {f"hamt.{name}": tensor for name, tensor in hamt.state_dict().items()}
-    weights = {name: tensor.cpu().contiguous() for name, tensor in weights.items()}
     artifacts.write_bytes(path, safetensors.torch.save(weights))
-    description = {
-        "vit": vit.config.to_mapping(),
-        "hamt": hamt.config.to_mapping(),
-        "metadata": metadata,
-        "weights_sha256": artifacts.sha256(path),
-        "vocabulary": list(vocabulary.tokens),
-    }
-    artifacts.write_json(path.with_suffix(".json"), description)
+    if isinstance(tokenizer, TokenizerFile):
+        artifacts.write_text(_tokenizer_path(path), tokenizer.text)
+    description = Description(
+        hamt=agent.policy.config,
+        vit=vit.config if isinstance(vit, VisionTransformer) else None,
+        clip=vit.config if isinstance(vit, ClipVisual) else None,
+        image_size=None if agent.vision is None else agent.vision.image_size,
+        max_tokens=agent.reader.max_tokens,
+        max_steps=agent.max_steps,
+        metadata=agent.metadata,
+        weights_sha256=artifacts.sha256(path),
+        tokenizer=isinstance(tokenizer, TokenizerFile),
+        vocabulary=tokenizer.tokens if isinstance(tokenizer, Vocabulary) else None,
+    )
+    _write_description(path, description)
 
 
 def load_agent(path: Path) -> Agent:
@@ -92,68 +116,61 @@ def load_agent(path: Path) -> Agent:
 
     Raises InputError where a file is missing or damaged, or weights do not fit the description.
     """
-    description_path = path.with_suffix(".json")
-    description = artifacts.read_json(description_path)
-    try:
-        vit = VisionTransformer(VitConfig(**description["vit"]))
-        hamt = Hamt(HamtConfig.from_mapping(description["hamt"]))
-        vocabulary = Vocabulary(tuple(description["vocabulary"]))
-        metadata, digest = description["metadata"], description["weights_sha256"]
-    except (KeyError, TypeError) as error:
-        raise InputError(
-            f"not the description of an agent ({error!r})", file=description_path
-        ) from None
+    description = read_description(path)
     weights = _read_safetensors(path)
-    vit = _fill(vit, _part(weights, "vit."), path, "vit.")
-    hamt = _fill(hamt, _part(weights, "hamt."), path, "hamt.")
-    if artifacts.sha256(path) != digest:
-        raise InputError(
-            file=path, expected=f"the weights named in {description_path.name}", received="others"
-        )
-    return Agent(VitEncoder(vit), hamt, vocabulary, metadata, path)
+    tokenizer: Vocabulary | TokenizerFile | None = None
+    if description.vocabulary is not None:
+        with naming(path.with_suffix(".json")):
+            tokenizer = Vocabulary(description.vocabulary)
+    elif description.tokenizer:
+        tokenizer = TokenizerFile(_tokenizer_path(path))
+    agent = Agent(
+        _load_vision(description, weights, path),
+        fill(lambda: Hamt(description.hamt), _part(weights, "hamt."), path, "hamt."),
+        Reader(tokenizer, description.hamt.vocab_size, description.max_tokens),
+        description.metadata,
+        path,
+        description.max_steps,
+    )
+    if artifacts.sha256(path) != description.weights_sha256:
+        expected = f"the weights named in {path.with_suffix('.json').name}"
+        raise InputError(file=path, expected=expected, received="others")
+    return agent
 
 
-def _fill(model: Model, state: State, path: Path, prefix: str = "") -> Model:
-    """`model` with the weights of `state`, frozen; `prefix` completes the names in messages."""
-    own = model.state_dict()
-    for name in own.keys() & state.keys():
-        if own[name].shape != state[name].shape:
-            expected, received = tuple(own[name].shape), tuple(state[name].shape)
-            raise InputError(file=path, field=prefix + name, expected=expected, received=received)
-    missing, unexpected = own.keys() - state.keys(), state.keys() - own.keys()
-    if missing or unexpected:
-        kinds = {"missing": missing, "unexpected": unexpected}
-        parts = [f"{kind} weights {_listed(n, prefix)}" for kind, n in kinds.items() if n]
-        raise InputError("; ".join(parts), file=path)
-    model.load_state_dict(state)
-    return model.eval().requires_grad_(False)
+def record_metadata(path: Path, values: dict[str, Any]) -> None:
+    """Write further metadata beside the weights at `path`."""
+    description = read_description(path)
+    description.metadata.update(values)
+    _write_description(path, description)
 
 
-def _listed(names: set[str], prefix: str) -> str:
-    shown = ", ".join(prefix + name for name in sorted(names)[:_SHOWN])
-    return shown if len(names) <= _SHOWN else f"{shown} and {len(names) - _SHOWN} more"
+def read_description(path: Path) -> Description:
+    """All but the weights of the agent at `path`; InputError where it is missing or wrong."""
+    file = path.with_suffix(".json")
+    with naming(file):
+        return validated(_DESCRIPTION, artifacts.read_json(file), file)
 
 
-def _read_torch(path: Path) -> Mapping[str, Any]:
-    try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
-    except FileNotFoundError:
-        raise InputError(file=path, expected="a checkpoint", received="no such file") from None
-    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        reason = str(error).partition("\n")[0]
-        raise InputError(f"not a readable checkpoint ({reason})", file=path) from None
-    if not isinstance(content, Mapping):
-        raise InputError(file=path, expected="a dictionary", received=type(content).__name__)
-    return content
+def _write_description(path: Path, description: Description) -> None:
+    artifacts.write_json(path.with_suffix(".json"), description.model_dump())
 
 
-def _tensors(content: Any, path: Path) -> State:
-    """The flat name → tensor mapping of a checkpoint, names without `module.`."""
-    if isinstance(content, Mapping):
-        content = content.get("state_dict", content)
-    if not isinstance(content, Mapping) or not all(map(torch.is_tensor, content.values())):
-        raise InputError(file=path, expected="named tensors", received="another layout")
-    return {_strip(name, _MODULE): tensor for name, tensor in content.items()}
+def _load_vision(description: Description, weights: State, path: Path) -> VitEncoder | None:
+    vit: VisionTransformer | ClipVisual
+    if description.clip is not None:
+        clip = description.clip
+        vit = fill(lambda: ClipVisual(clip), _part(weights, "clip."), path, "clip.")
+    elif description.vit is not None:
+        config = description.vit
+        vit = fill(lambda: VisionTransformer(config), _part(weights, "vit."), path, "vit.")
+    else:
+        return None
+    return VitEncoder(vit, description.image_size)
+
+
+def _tokenizer_path(path: Path) -> Path:
+    return path.with_suffix(".tokenizer.json")
 
 
 def _read_safetensors(path: Path) -> State:
@@ -166,11 +183,8 @@ def _read_safetensors(path: Path) -> State:
 
 
 def _part(weights: State, prefix: str) -> State:
-    return {_strip(n, prefix): tensor for n, tensor in weights.items() if n.startswith(prefix)}
-
-
-def _strip(name: str, *prefixes: str) -> str:
-    for prefix in prefixes:
-        if name.startswith(prefix):
-            return name.removeprefix(prefix)
-    return name
+    return {
+        name.removeprefix(prefix): tensor
+        for name, tensor in weights.items()
+        if name.startswith(prefix)
+    }

@@ -1,7 +1,7 @@
 """Sizes and options of a HAMT policy."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from vlnhijack.errors import InputError
@@ -44,7 +44,7 @@ class HamtConfig:
     feature_dropout: float = 0.4
 
     def __post_init__(self) -> None:
-        if self.hidden_size % self.num_attention_heads:
+        if self.num_attention_heads < 1 or self.hidden_size % self.num_attention_heads:
             raise InputError(
                 field="hidden_size",
                 expected=f"a multiple of num_attention_heads ({self.num_attention_heads})",
@@ -68,6 +68,3 @@ class HamtConfig:
             if name not in known | _FIXED_OPTIONS.keys() | _IGNORED_OPTIONS:
                 raise InputError(field=name, expected="a HAMT option", received="an unknown name")
         return cls(**{name: value for name, value in values.items() if name in known})
-
-    def to_mapping(self) -> dict[str, Any]:
-        return asdict(self)

@@ -13,11 +13,9 @@ from torch import Tensor
 
 from vlnhijack.agents.observation import ObservationTable, gather_views
 from vlnhijack.agents.policy import Policy, Text, text_rows
-from vlnhijack.agents.vocabulary import Vocabulary
+from vlnhijack.agents.reader import Reader
 from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.views import nearest_view
-
-MAX_WORDS = 60
 
 
 class Instructions(NamedTuple):
@@ -33,11 +31,9 @@ class Instructions(NamedTuple):
         return Instructions(text_rows(self.text, episodes, longest), mask[:, :longest])
 
 
-def read_instructions(
-    policy: Policy, vocabulary: Vocabulary, episodes: Sequence[Episode]
-) -> Instructions:
-    """The episodes' instructions, encoded; at most 60 tokens each, as HAMT reads them."""
-    ids, mask = vocabulary.encode_batch([episode.instruction for episode in episodes], MAX_WORDS)
+def read_instructions(policy: Policy, reader: Reader, episodes: Sequence[Episode]) -> Instructions:
+    """The episodes' instructions, encoded."""
+    ids, mask = reader(episodes)
     return Instructions(policy.encode_text(ids, mask), mask)
 
 

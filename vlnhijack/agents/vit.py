@@ -1,7 +1,6 @@
 """Vision transformer (Dosovitskiy et al., ICLR 2021) with timm's parameter names."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
@@ -27,10 +26,10 @@ class VitConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "image_size", tuple(self.image_size))
-        if any(side % self.patch for side in self.image_size):
+        if self.patch < 1 or any(side % self.patch for side in self.image_size):
             expected = f"multiples of the patch size {self.patch}"
             raise InputError(field="image_size", expected=expected, received=self.image_size)
-        if self.dim % self.heads:
+        if self.heads < 1 or self.dim % self.heads:
             expected = f"a multiple of heads ({self.heads})"
             raise InputError(field="dim", expected=expected, received=self.dim)
 
@@ -39,8 +38,9 @@ class VitConfig:
         """Rows and columns of patches."""
         return self.image_size[0] // self.patch, self.image_size[1] // self.patch
 
-    def to_mapping(self) -> dict[str, Any]:
-        return asdict(self)
+    @property
+    def feature_size(self) -> int:
+        return self.dim
 
 
 class PatchEmbed(nn.Module):
@@ -61,19 +61,25 @@ class Attention(nn.Module):
         self.proj = Linear(config.dim, config.dim)
 
     def forward(self, tokens: Tensor, rows: slice) -> Tensor:
-        width = tokens.shape[-1]
-        queries = self.qkv(tokens[:, rows], slice(width))
-        keys, values = self.qkv(tokens, slice(width, None)).chunk(2, -1)
-        query, key, value = (
-            part.unflatten(-1, (self.heads, -1)).transpose(1, 2) for part in (queries, keys, values)
-        )
-        return self.proj(attend(query, key, value).transpose(1, 2).flatten(2))
+        return self.proj(self_attention(self.qkv, tokens, rows, self.heads))
+
+
+def self_attention(packed: Linear, tokens: Tensor, rows: slice, heads: int) -> Tensor:
+    """What the given rows of tokens (B,N,W) attend to in all, (B,R,W); `packed` makes queries, keys
+    and values, one after the other."""
+    width = tokens.shape[-1]
+    queries = packed(tokens[:, rows], slice(width))
+    keys, values = packed(tokens, slice(width, None)).chunk(2, -1)
+    query, key, value = (
+        part.unflatten(-1, (heads, -1)).transpose(1, 2) for part in (queries, keys, values)
+    )
+    return attend(query, key, value).transpose(1, 2).flatten(2)
 
 
 class Mlp(nn.Module):
     def __init__(self, config: VitConfig) -> None:
         super().__init__()
-        hidden = int(config.dim * config.mlp_ratio)
+        hidden = round(config.dim * config.mlp_ratio)
         self.fc1 = Linear(config.dim, hidden)
         self.fc2 = Linear(hidden, config.dim)
 

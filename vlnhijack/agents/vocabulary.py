@@ -2,12 +2,9 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-
-import torch
-from torch import Tensor
 
 from vlnhijack.errors import InputError
 
@@ -50,13 +47,6 @@ class Vocabulary:
             raise InputError(field="max_length", expected="at least 2", received=max_length)
         ids = [self._ids.get(word, UNK) for word in split_words(text)]
         return [CLS, *ids[: max_length - 2], SEP]
-
-    def encode_batch(self, texts: Sequence[str], max_length: int) -> tuple[Tensor, Tensor]:
-        """Token ids (B,T) int64 and mask (B,T) bool, T the length of the longest text."""
-        rows = [self.encode(text, max_length) for text in texts]
-        longest = max(map(len, rows), default=0)
-        ids = torch.tensor([row + [PAD] * (longest - len(row)) for row in rows], dtype=torch.int64)
-        return ids, ids != PAD
 
     @cached_property
     def _ids(self) -> dict[str, int]:

@@ -88,7 +88,7 @@ def attack_objective(
     ]
     walked = trajectories(table, attacked, [episode.heading for episode in episodes])
     with torch.no_grad():
-        instructions = read_instructions(agent.policy, agent.vocabulary, episodes)
+        instructions = read_instructions(agent.policy, agent.reader, episodes)
         past = history(agent.policy, table, views.clean, walked)
     return Objective(
         agent=agent,

@@ -12,24 +12,15 @@ from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent
 from vlnhijack.agents.observation import ObservationTable
 from vlnhijack.errors import InputError
-from vlnhijack.evaluation.evaluate import navigate
+from vlnhijack.evaluation.evaluate import Rates, mean_scores, navigate
 from vlnhijack.navigation.episode import Episode
-
-Rates = dict[str, float]
 
 
 def rates(
     agent: Agent, table: ObservationTable, features: Tensor, episodes: Sequence[Episode]
 ) -> Rates:
-    """Mean SR, OSR, SPL and nDTW (0–1) with the number n of episodes."""
-    scores = navigate(agent, table, features, episodes)
-    return {
-        "n": len(scores),
-        "sr": float(np.mean([s.success for s in scores])),
-        "osr": float(np.mean([s.oracle_success for s in scores])),
-        "spl": float(np.mean([s.spl for s in scores])),
-        "ndtw": float(np.mean([s.ndtw for s in scores])),
-    }
+    """The `mean_scores` of the agent on ordinary episodes."""
+    return mean_scores(navigate(agent, table, features, episodes))
 
 
 def ablate(
@@ -62,7 +53,7 @@ def shuffle_instructions(episodes: Sequence[Episode], seed: int) -> list[Episode
     shuffled = []
     for episode in episodes:
         others = [
-            other.instruction
+            (other.instruction, other.encoding)
             for other in episodes
             if other.scan == episode.scan and other.path_id != episode.path_id
         ]
@@ -70,7 +61,8 @@ def shuffle_instructions(episodes: Sequence[Episode], seed: int) -> list[Episode
             raise InputError(
                 field=f"paths of {episode.scan}", expected="two or more", received="one"
             )
-        shuffled.append(replace(episode, instruction=others[rng.integers(len(others))]))
+        text, encoding = others[rng.integers(len(others))]
+        shuffled.append(replace(episode, instruction=text, encoding=encoding))
     return shuffled
 
 
@@ -95,7 +87,7 @@ def replace_words(
         text = episode.instruction
         for pattern, other in swaps:
             text = pattern.sub(other, text)
-        replaced.append(replace(episode, instruction=text))
+        replaced.append(replace(episode, instruction=text, encoding=None))
     return replaced
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -13,6 +14,8 @@ from vlnhijack.evaluation.records import Record
 from vlnhijack.navigation.episode import Episode
 from vlnhijack.navigation.metrics import PathMetrics, path_metrics
 from vlnhijack.threat import AttackInstance, guide
+
+Rates = dict[str, float]
 
 
 def act(
@@ -27,13 +30,15 @@ def act(
     features (M,36,D) of all viewpoints of the table.
     """
     with torch.no_grad():
-        instructions = read_instructions(agent.policy, agent.vocabulary, episodes)
+        instructions = read_instructions(agent.policy, agent.reader, episodes)
     rows = [
         [table.index[episode.scan, viewpoint] for viewpoint in walk]
         for episode, walk in zip(episodes, guides, strict=True)
     ]
     headings = [episode.heading for episode in episodes]
-    walked = rollout(agent.policy, table, features, instructions, rows, headings)
+    walked = rollout(
+        agent.policy, table, features, instructions, rows, headings, max_steps=agent.max_steps
+    )
     return [
         [table.viewpoint(row) for row in path[len(walk) - 1 :]]
         for path, walk in zip(walked, guides, strict=True)
@@ -49,6 +54,25 @@ def navigate(
         path_metrics(table.graphs[episode.scan], path, episode.path)
         for episode, path in zip(episodes, walked, strict=True)
     ]
+
+
+def mean_scores(scores: Sequence[PathMetrics]) -> Rates:
+    """Means of SR, OSR, SPL, nDTW and SDTW (0–1), of path length and navigation error in metres,
+    with the number n of episodes."""
+    columns = {
+        "sr": "success",
+        "osr": "oracle_success",
+        "spl": "spl",
+        "ndtw": "ndtw",
+        "sdtw": "sdtw",
+        "path_length": "path_length",
+        "navigation_error": "navigation_error",
+    }
+    means = {
+        name: float(np.mean([getattr(score, column) for score in scores]))
+        for name, column in columns.items()
+    }
+    return {"n": len(scores), **means}
 
 
 def evaluate_instance(

@@ -2,17 +2,15 @@
 
 import time
 from functools import partial
-from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from vlnhijack.agents.features import Features, cached_features
 from vlnhijack.artifacts import read_json, sha256, write_json
-from vlnhijack.errors import InputError
 from vlnhijack.evaluation.evaluate import navigate
 from vlnhijack.evaluation.gate import check_baseline
-from vlnhijack.experiments.context import Context
+from vlnhijack.experiments.context import Context, recorded_rate
 from vlnhijack.experiments.views import encode_house
 from vlnhijack.settings import house_folder
 
@@ -58,7 +56,7 @@ def baseline(context: Context, scan: str) -> float:
     episodes = context.scans[scan].val_seen
     scores = navigate(context.agent, context.table, features, episodes)
     successes = int(sum(score.success for score in scores))
-    recorded = _recorded_rate(context.agent.metadata, context.agent.path, scan)
+    recorded = recorded_rate(context.agent, scan)
     check_baseline(scan, successes, len(episodes), recorded)
     seconds = time.perf_counter() - started
     write_json(
@@ -71,15 +69,3 @@ def baseline(context: Context, scan: str) -> float:
         },
     )
     return seconds
-
-
-def _recorded_rate(metadata: dict, weights: Path, scan: str) -> float:
-    known = metadata.get("val_seen_by_house", {})
-    if scan not in known:
-        raise InputError(
-            file=weights.with_suffix(".json"),
-            field="metadata.val_seen_by_house",
-            expected=f"the clean rate in {scan} (vlnhijack agent eval --record {scan})",
-            received=", ".join(known) or "none",
-        )
-    return float(known[scan]["sr"])

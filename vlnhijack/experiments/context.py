@@ -14,6 +14,7 @@ from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
 from vlnhijack.agents.precision import Precision, default_precision, set_precision
+from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import (
     DrawnInstances,
     ExperimentConfig,
@@ -91,12 +92,33 @@ class Context:
 
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
-    """Load the agent, at the precisions of the experiment, and the houses that it names."""
+    """Load the agent, at the precisions of the experiment, and the houses that it names.
+
+    Raises InputError where the agent has no recorded rate in a house or cannot read its episodes.
+    """
     houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
-    context = Context(config, folder, progress, load_agent(agent_file(config.agent)), houses)
-    set_precision(context.agent.encoder, context.precision["vision"])
-    set_precision(context.agent.policy, context.precision["policy"])
+    agent = load_agent(agent_file(config.agent))
+    for house in houses.values():
+        recorded_rate(agent, house.name)
+        agent.reader(episodes_of(house, "val_seen"))
+    context = Context(config, folder, progress, agent, houses)
+    set_precision(agent.encoder, context.precision["vision"])
+    set_precision(agent.policy, context.precision["policy"])
     return context
+
+
+def recorded_rate(agent: Agent, scan: str) -> float:
+    """The clean success rate on val_seen of a house that is stored with the agent's weights."""
+    known = agent.metadata.get("val_seen_by_house", {})
+    command = f"vlnhijack agent eval {agent.path} --house {scan} --record"
+    if scan not in known:
+        raise InputError(
+            file=agent.path.with_suffix(".json"),
+            field="metadata.val_seen_by_house",
+            expected=f"the clean rate in {scan} ({command})",
+            received=", ".join(known) or "none",
+        )
+    return float(known[scan]["sr"])
 
 
 def house_list(wanted: list[PickedInstance] | DrawnInstances | StoredInstances) -> list[str]:

@@ -5,7 +5,7 @@ interrupted training goes on where it was.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.agents.reader import Reader
 from vlnhijack.agents.training.encoder import EncoderSchedule, ViewTargets, train_encoder
 from vlnhijack.agents.training.imitation import ImitationSchedule, Lessons, train_policy
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
@@ -86,12 +87,16 @@ def train_agent(config: AgentConfig, folder: Path, progress: Progress) -> Agent:
     vocabulary = Vocabulary.build(episode.instruction for episode in train)
     hamt = Hamt(HamtConfig.from_mapping({"vocab_size": len(vocabulary), **config.policy}))
     agent = Agent(
-        VitEncoder(vit).eval(), hamt, vocabulary, {}, folder / f"{config.name}.safetensors"
+        VitEncoder(vit).eval(),
+        hamt,
+        Reader(vocabulary, hamt.config.vocab_size),
+        {},
+        folder / f"{config.name}.safetensors",
     )
     features = what_it_sees(config, agent, features)
     _policy(config, agent, table, features, train, folder, progress)
     metadata = measure(config, agent, table, features, houses)
-    save_agent(agent.path, vit, hamt, vocabulary, metadata)
+    save_agent(replace(agent, metadata=metadata))
     write_json(folder / "rates.json", metadata)
     return load_agent(agent.path)
 
@@ -232,7 +237,7 @@ def _policy(
     losses: list[float] = []
     for step, loss in train_policy(
         policy,
-        Lessons(table, features, agent.vocabulary, episodes),
+        Lessons(table, features, agent.reader, episodes),
         schedule,
         config.seed,
         optimiser,

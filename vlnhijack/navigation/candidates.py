@@ -16,7 +16,8 @@ class Candidate:
     """A neighbour and the view that looks at it most directly.
 
     heading (not wrapped) and elevation of the neighbour in the world's frame, radians; distance:
-    angle between it and the view's axis, radians.
+    angle between it and the view's axis, radians; idx: its place, from 1, among the neighbours that
+    this view shows, nearest to the axis first (MatterSim's navigableLocations).
     """
 
     viewpoint: str
@@ -24,6 +25,7 @@ class Candidate:
     heading: float
     elevation: float
     distance: float
+    idx: int
 
 
 def candidates(graph: NavigationGraph) -> dict[str, list[Candidate]]:
@@ -52,6 +54,7 @@ def _candidates_of(graph: NavigationGraph, row: int) -> list[Candidate]:
             float(view_angles(int(best[k]))[0] + heading[best[k], k]),
             float(view_angles(int(best[k]))[1] + elevation[best[k], k]),
             float(distance[best[k], k]),
+            1 + int((distance[best[k]] < distance[best[k], k]).sum()),
         )
         for k in order
         if visible[:, k].any()

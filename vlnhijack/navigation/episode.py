@@ -63,6 +63,14 @@ def stream_episodes(
         yield from _r2r_episodes(file, graphs)
 
 
+def by_scan(episodes: Iterable[Episode]) -> dict[str, list[Episode]]:
+    """The episodes of each scan, in their order."""
+    found: dict[str, list[Episode]] = {}
+    for episode in episodes:
+        found.setdefault(episode.scan, []).append(episode)
+    return found
+
+
 def save_episodes(file: Path, episodes: Iterable[Episode]) -> None:
     """Write episodes in R2R form, those of one path as one record."""
     records: dict[tuple[str, int], dict[str, Any]] = {}

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from vlnhijack.artifacts import read_json, validated
+from vlnhijack.artifacts import stream_json_object, validated
 from vlnhijack.errors import InputError
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.navigation.views import VIEWS
@@ -46,16 +46,17 @@ class _Object(BaseModel):
     bbox2d: list[Box]
 
 
-_FILE = TypeAdapter(dict[str, dict[str, _Object]])
+_ENTRY = TypeAdapter(dict[str, _Object])
 
 
 def stream_sightings(source: Path, graphs: Mapping[str, NavigationGraph]) -> Iterator[Sighting]:
     """The sightings of REVERIE's `BBox` folder, or of one .json(.gz) file of all its entries.
 
     The folder holds `<scan>_<viewpoint>.json` files of {viewpoint: {object id: …}}; the one file
-    {"<scan>_<viewpoint>": {object id: …}}; an object {"name", "visible_pos", "bbox2d"}. Raises
-    InputError with file, entry and field for wrong types, unknown viewpoints, boxes outside their
-    view, and lists that do not match.
+    {"<scan>_<viewpoint>": {object id: …}}; an object {"name", "visible_pos", "bbox2d"}. Entries are
+    read one at a time. Raises InputError with file, entry and field for wrong types, unknown
+    viewpoints, viewpoints and objects that come twice, boxes outside their view, and lists that do
+    not match.
     """
     if source.is_dir():
         files = sorted(source.glob("*.json"))
@@ -64,7 +65,8 @@ def stream_sightings(source: Path, graphs: Mapping[str, NavigationGraph]) -> Ite
     else:
         files = [source]
     for file in files:
-        for key, objects in validated(_FILE, read_json(file), file).items():
+        for key, value in stream_json_object(file):
+            objects = validated(_ENTRY, value, file, key)
             whole = file.stem if source.is_dir() else key
             scan, viewpoint = _split(file, whole, graphs)
             if source.is_dir() and viewpoint != key:

@@ -1,15 +1,21 @@
+"""Agents in our own form."""
+
 import json
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import pytest
 import safetensors.torch
 import torch
-from torch import Tensor
+from hypothesis import HealthCheck, given, settings
 
-from vlnhijack.agents.checkpoints import load_agent, load_hamt, load_vit, save_agent
+from tests.fuzz import refused_or_read, texts
+from vlnhijack.agents.checkpoints import Agent, load_agent, record_metadata, save_agent
+from vlnhijack.agents.clip import ClipConfig, ClipVisual
+from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
+from vlnhijack.agents.reader import Reader
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.errors import InputError
@@ -27,102 +33,61 @@ CONFIG = HamtConfig(
     image_feat_size=8,
 )
 VIT = VitConfig((8, 12), patch=4, dim=8, depth=1, heads=2)
-METADATA = {"clean": {"val_seen": 0.8}, "provenance": "a test"}
+CLIP = ClipConfig((8, 12), patch=4, width=6, layers=2, heads=3, out=8)
+METADATA = {"val_seen_by_house": {"alder": {"sr": 0.8}}, "provenance": "a test"}
+READER = Reader(Vocabulary.build(["walk past the sofa"]), CONFIG.vocab_size, max_tokens=10)
 
 
-def saved(content: Any, tmp_path: Path) -> Path:
-    torch.save(content, tmp_path / "checkpoint.pt")
-    return tmp_path / "checkpoint.pt"
-
-
-def agent_layout(state: dict[str, Tensor], prefix: str = "vln_bert.") -> dict[str, Any]:
-    named = {f"{prefix}{name}": tensor for name, tensor in state.items()}
-    return {"vln_bert": {"epoch": 3, "state_dict": named, "optimizer": {}}, "critic": {}}
-
-
-def pretraining_layout(state: dict[str, Tensor]) -> dict[str, Tensor]:
-    return {
-        name if name.startswith("next_action.") else f"bert.{name}": tensor
-        for name, tensor in state.items()
-    } | {"mlm_head.predictions.bias": torch.zeros(9), "itm_head.net.0.weight": torch.zeros(2)}
-
-
-@pytest.mark.parametrize(
-    "layout",
-    [
-        agent_layout,
-        lambda state: agent_layout(state, "module.vln_bert."),
-        pretraining_layout,
-        lambda state: pretraining_layout(state) | {"bert.vision_backbone.norm.bias": torch.ones(8)},
-    ],
-    ids=["agent", "parallel agent", "pretraining", "end-to-end pretraining"],
-)
-def test_every_official_layout_loads(layout: Any, tmp_path: Path) -> None:
-    state = Hamt(CONFIG).state_dict()
-    policy = load_hamt(saved(layout(state), tmp_path), CONFIG)
-    assert all(torch.equal(tensor, state[name]) for name, tensor in policy.state_dict().items())
-    assert not policy.training
-    assert not any(parameter.requires_grad for parameter in policy.parameters())
-
-
-def test_wrong_keys_are_listed(tmp_path: Path) -> None:
-    state = Hamt(CONFIG).state_dict()
-    state["next_action.net.5.bias"] = state.pop("next_action.net.4.bias")
-    with pytest.raises(InputError, match=r"missing.*net\.4\.bias.*unexpected.*net\.5\.bias"):
-        load_hamt(saved(agent_layout(state), tmp_path), CONFIG)
-
-
-def test_wrong_shapes_are_named(tmp_path: Path) -> None:
-    state = Hamt(CONFIG).state_dict()
-    state["next_action.net.0.weight"] = torch.zeros(8, 7)
-    with pytest.raises(InputError, match=r"next_action\.net\.0\.weight.*\(8, 8\).*\(8, 7\)"):
-        load_hamt(saved(agent_layout(state), tmp_path), CONFIG)
-
-
-@pytest.mark.parametrize(
-    "content", [[1, 2], {"vln_bert": {"state_dict": {"name": 3}}}], ids=["list", "no tensors"]
-)
-def test_other_layouts_are_refused(content: Any, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="checkpoint.pt"):
-        load_hamt(saved(content, tmp_path), CONFIG)
-
-
-def test_unreadable_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        load_hamt(tmp_path / "absent.pt", CONFIG)
-    (tmp_path / "broken.pt").write_text("not a checkpoint")
-    with pytest.raises(InputError, match="broken.pt"):
-        load_hamt(tmp_path / "broken.pt", CONFIG)
-
-
-@pytest.mark.parametrize("prefix", ["", "bert.vision_backbone."])
-def test_vit_loads_without_its_head(prefix: str, tmp_path: Path) -> None:
-    state = VisionTransformer(VIT).state_dict()
-    stored = {f"{prefix}{name}": tensor for name, tensor in state.items()}
-    stored |= {"head.weight": torch.zeros(5, 8), "head.bias": torch.zeros(5)}
-    vit = load_vit(saved({"state_dict": stored}, tmp_path), VIT)
-    assert all(torch.equal(tensor, state[name]) for name, tensor in vit.state_dict().items())
+def agent(path: Path, vision: VitEncoder | None, reader: Reader = READER) -> Agent:
+    return Agent(vision, Hamt(CONFIG), reader, METADATA, path / "small.safetensors", 20)
 
 
 @pytest.fixture
 def agent_path(tmp_path: Path) -> Path:
-    path = tmp_path / "small.safetensors"
-    vocabulary = Vocabulary.build(["walk past the sofa and stop"])
-    save_agent(path, VisionTransformer(VIT), Hamt(CONFIG), vocabulary, METADATA)
-    return path
+    save_agent(agent(tmp_path, VitEncoder(VisionTransformer(VIT))))
+    return tmp_path / "small.safetensors"
 
 
-def test_saved_agent_comes_back(agent_path: Path) -> None:
-    agent = load_agent(agent_path)
-    assert agent.metadata == METADATA
-    assert agent.vocabulary.tokens[4:] == ("and", "past", "sofa", "stop", "the", "walk")
-    assert agent.policy.config == CONFIG
-    assert agent.encoder.vit.config == VIT
-    weights = safetensors.torch.load_file(agent_path)
-    for name, tensor in agent.policy.state_dict().items():
-        assert torch.equal(tensor, weights[f"hamt.{name}"])
-    for name, tensor in agent.encoder.vit.state_dict().items():
-        assert torch.equal(tensor, weights[f"vit.{name}"])
+@pytest.mark.parametrize(
+    "vision",
+    [VitEncoder(VisionTransformer(VIT)), VitEncoder(ClipVisual(CLIP), (48, 64)), None],
+    ids=["vit", "clip", "none"],
+)
+def test_a_saved_agent_comes_back(vision: VitEncoder | None, tmp_path: Path) -> None:
+    given = agent(tmp_path, vision)
+    save_agent(given)
+    found = load_agent(given.path)
+    assert (found.metadata, found.max_steps) == (METADATA, 20)
+    assert found.reader == READER
+    assert found.policy.config == CONFIG
+    models = [(found.policy, given.policy)]
+    if vision is not None:
+        assert found.encoder.vit.config == vision.vit.config
+        assert found.encoder.image_size == vision.image_size
+        models.append((found.encoder.vit, vision.vit))
+    for ours, theirs in models:
+        assert not ours.training
+        for name, tensor in theirs.state_dict().items():
+            assert torch.equal(ours.state_dict()[name], tensor), name
+
+
+def test_an_agent_without_an_encoder_says_so_when_it_should_look(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"small\.safetensors: .*--vision"):
+        _ = agent(tmp_path, None).encoder
+
+
+def test_parts_that_do_not_fit_each_other_are_refused(tmp_path: Path) -> None:
+    narrow = VitEncoder(VisionTransformer(VitConfig((8, 12), patch=4, dim=6, depth=1, heads=2)))
+    with pytest.raises(InputError, match="image_feat_size: expected 6, received 8"):
+        agent(tmp_path, narrow)
+    with pytest.raises(InputError, match="max_tokens: expected '≤ 10', received 11|≤ 10"):
+        agent(tmp_path, None, Reader(None, 9, max_tokens=11))
+
+
+def test_rates_are_recorded_beside_the_weights(agent_path: Path) -> None:
+    record_metadata(agent_path, {"val_seen_by_house": {"birch": {"sr": 0.5}}})
+    found = load_agent(agent_path).metadata
+    assert found == {"val_seen_by_house": {"birch": {"sr": 0.5}}, "provenance": "a test"}
 
 
 def test_agent_of_another_size_is_refused(agent_path: Path) -> None:
@@ -131,6 +96,15 @@ def test_agent_of_another_size_is_refused(agent_path: Path) -> None:
     description["hamt"]["vocab_size"] = 11
     description_path.write_text(json.dumps(description))
     with pytest.raises(InputError, match=r"hamt\.embeddings\.word_.*\(11, 8\).*\(9, 8\)"):
+        load_agent(agent_path)
+
+
+def test_a_wrong_type_in_the_description_is_named(agent_path: Path) -> None:
+    description_path = agent_path.with_suffix(".json")
+    description = json.loads(description_path.read_text())
+    description["hamt"]["hidden_size"] = "wide"
+    description_path.write_text(json.dumps(description))
+    with pytest.raises(InputError, match=r"small\.json: hamt\.hidden_size.*'wide'"):
         load_agent(agent_path)
 
 
@@ -147,3 +121,20 @@ def test_damaged_agent_files_are_refused(agent_path: Path, suffix: str) -> None:
     agent_path.with_suffix(suffix).write_text("{}")
     with pytest.raises(InputError, match="small"):
         load_agent(agent_path)
+
+
+FUNCTION_SCOPED = [HealthCheck.function_scoped_fixture]
+DESCRIPTION = {
+    "hamt": asdict(CONFIG),
+    "vit": asdict(VIT),
+    "metadata": {},
+    "weights_sha256": "",
+    "vocabulary": ["[PAD]", "[UNK]", "[CLS]", "[SEP]"],
+}
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=FUNCTION_SCOPED)
+@given(texts(DESCRIPTION))
+def test_no_description_ends_in_a_traceback(agent_path: Path, content: bytes) -> None:
+    description_path = agent_path.with_suffix(".json")
+    refused_or_read(description_path, content, lambda _: load_agent(agent_path))

@@ -1,3 +1,5 @@
+from dataclasses import asdict
+
 import pytest
 
 from vlnhijack.agents.hamt_config import HamtConfig
@@ -6,7 +8,7 @@ from vlnhijack.errors import InputError
 
 def test_round_trip() -> None:
     config = HamtConfig(hidden_size=24, num_attention_heads=3, no_lang_ca=True)
-    assert HamtConfig.from_mapping(config.to_mapping()) == config
+    assert HamtConfig.from_mapping(asdict(config)) == config
 
 
 def test_options_of_the_original_are_understood() -> None:

@@ -22,7 +22,7 @@ def walk(
     max_steps: int = 15,
     sampler: np.random.Generator | None = None,
 ) -> list[list[str]]:
-    read = read_instructions(given.agent.policy, given.agent.vocabulary, episodes)
+    read = read_instructions(given.agent.policy, given.agent.reader, episodes)
     paths = rollout(
         given.agent.policy,
         given.table,

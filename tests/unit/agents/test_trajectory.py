@@ -4,9 +4,9 @@ import torch
 from tests.hamt_by_hand import logits_along
 from tests.worlds import World, world
 from vlnhijack.agents.hamt import Hamt
+from vlnhijack.agents.reader import MAX_TOKENS
 from vlnhijack.agents.rollout import rows_of
 from vlnhijack.agents.trajectory import (
-    MAX_WORDS,
     Trajectories,
     history,
     read_instructions,
@@ -44,7 +44,7 @@ def every_step(walked: Trajectories) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def batched(given: World, episodes: list[Episode], features: torch.Tensor) -> torch.Tensor:
-    read = read_instructions(given.agent.policy, given.agent.vocabulary, episodes)
+    read = read_instructions(given.agent.policy, given.agent.reader, episodes)
     walked = walk(given, episodes)
     rows, steps = every_step(walked)
     past = history(given.agent.policy, given.table, features, walked)
@@ -81,15 +81,15 @@ def test_actions_are_the_moves_of_the_path_and_stop(given: World) -> None:
 def test_long_instructions_are_cut(given: World) -> None:
     first = given.episodes[0]
     long = Episode(0, first.scan, first.path, 0.0, "walk " * 100, "0_0", 1.0)
-    read = read_instructions(given.agent.policy, given.agent.vocabulary, [long, first])
-    assert read.mask.shape == (2, MAX_WORDS)
-    assert read.rows(torch.tensor([1, 1, 0])).mask.sum(1).tolist()[2] == MAX_WORDS
+    read = read_instructions(given.agent.policy, given.agent.reader, [long, first])
+    assert read.mask.shape == (2, MAX_TOKENS)
+    assert read.rows(torch.tensor([1, 1, 0])).mask.sum(1).tolist()[2] == MAX_TOKENS
 
 
 def gradient_of_last_step(given: World, episode: Episode) -> torch.Tensor:
     """Size of the gradient (M,) of the STOP logit at the end of a walk to each panorama."""
     features = given.features.clone().requires_grad_()
-    read = read_instructions(given.agent.policy, given.agent.vocabulary, [episode])
+    read = read_instructions(given.agent.policy, given.agent.reader, [episode])
     walked = walk(given, [episode])
     last = walked.lengths - 1
     policy, first = given.agent.policy, torch.tensor([0])

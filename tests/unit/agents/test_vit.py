@@ -1,3 +1,5 @@
+from dataclasses import asdict
+
 import pytest
 import torch
 
@@ -45,7 +47,7 @@ def test_parameter_names_are_those_of_timm(vit: VisionTransformer) -> None:
 @pytest.mark.parametrize("wrong", [{"image_size": (13, 20)}, {"heads": 3}])
 def test_sizes_that_do_not_divide_are_refused(wrong: dict) -> None:
     with pytest.raises(InputError):
-        VitConfig(**{**CONFIG.to_mapping(), **wrong})
+        VitConfig(**{**asdict(CONFIG), **wrong})
 
 
 def test_patches_are_embedded_as_by_the_convolution(vit: VisionTransformer) -> None:

@@ -1,7 +1,6 @@
 import pytest
-import torch
 
-from vlnhijack.agents.vocabulary import CLS, PAD, SEP, UNK, Vocabulary
+from vlnhijack.agents.vocabulary import CLS, SEP, UNK, Vocabulary
 from vlnhijack.errors import InputError
 
 WORDS = Vocabulary.build(["Walk past the sofa.", "Walk to the sofa, then stop!"], min_count=1)
@@ -29,15 +28,6 @@ def test_long_texts_keep_their_ends() -> None:
     ids = WORDS.encode("walk " * 50, max_length=7)
     assert len(ids) == 7
     assert (ids[0], ids[-1]) == (CLS, SEP)
-
-
-def test_batches_are_padded_to_the_longest() -> None:
-    ids, mask = WORDS.encode_batch(["walk", "walk to the sofa"], max_length=20)
-    assert ids.shape == mask.shape == (2, 6)
-    assert ids.dtype == torch.int64
-    assert mask.dtype == torch.bool
-    assert mask.sum(1).tolist() == [3, 6]
-    assert (ids[0, 3:] == PAD).all()
 
 
 @pytest.mark.parametrize(

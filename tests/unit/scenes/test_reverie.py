@@ -1,6 +1,7 @@
 """REVERIE's object boxes, in one file and in its folder."""
 
 import gzip
+import itertools
 import json
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,7 @@ def test_scans_and_viewpoints_may_have_underscores(tmp_path: Path) -> None:
         ),
         (
             {"east_east03": {"1": SOFA | {"visible_pos": [3, 36]}}},
-            r"east_east03\.1\.visible_pos\.1: expected less than 36, received 36",
+            r"east_east03: 1\.visible_pos\.1: expected less than 36, received 36",
         ),
         (
             {"east_east03": {"1": SOFA | {"bbox2d": [[1, 0, 640, 1], [0, 0, 1, 1]]}}},
@@ -80,6 +81,25 @@ def test_a_bad_entry_is_named(tmp_path: Path, entries: Any, expected: str) -> No
     file.write_text(json.dumps(entries))
     with pytest.raises(InputError, match=rf"boxes\.json: .*{expected}"):
         list(stream_sightings(file, GRAPHS))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('{"east_east03": {}, "east_east03": {}}', "east_east03: expected a text that is no key"),
+        ('{"east_east03": {"1": 0, "1": 0}}', "east_east03: expected each key once, received '1'"),
+    ],
+)
+def test_what_comes_twice_is_refused(tmp_path: Path, text: str, expected: str) -> None:
+    (tmp_path / "boxes.json").write_text(text)
+    with pytest.raises(InputError, match=rf"boxes\.json: {expected}"):
+        list(stream_sightings(tmp_path / "boxes.json", GRAPHS))
+
+
+def test_entries_are_read_one_at_a_time(tmp_path: Path) -> None:
+    file = tmp_path / "boxes.json"
+    file.write_text(json.dumps(ENTRIES)[:-1] + ", broken")
+    assert len(list(itertools.islice(stream_sightings(file, GRAPHS), 3))) == 3
 
 
 def test_a_bad_folder_is_named(tmp_path: Path) -> None:

@@ -15,17 +15,17 @@ from torch import Tensor, nn
 from vlnhijack import seeds
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.observation import ObservationTable
+from vlnhijack.agents.reader import Reader
 from vlnhijack.agents.rollout import rollout, rows_of
 from vlnhijack.agents.training.encoder import warmup_cosine
 from vlnhijack.agents.trajectory import (
-    MAX_WORDS,
     Instructions,
     Trajectories,
     history,
     step_logits,
     trajectories,
 )
-from vlnhijack.agents.vocabulary import UNK, Vocabulary
+from vlnhijack.agents.vocabulary import UNK
 from vlnhijack.errors import CheckError
 from vlnhijack.navigation.episode import Episode
 
@@ -85,7 +85,7 @@ class Lessons:
 
     table: ObservationTable
     features: Tensor
-    vocabulary: Vocabulary
+    reader: Reader
     episodes: Sequence[Episode]
 
 
@@ -136,7 +136,7 @@ def _loss(
 ) -> Tensor:
     """Loss of a batch whose first `sampled` episodes walk the agent's own samples."""
     table = lessons.table
-    ids, mask = lessons.vocabulary.encode_batch([e.instruction for e in batch], MAX_WORDS)
+    ids, mask = lessons.reader(batch)
     dropped = torch.from_numpy(rng.random(tuple(ids.shape)) < schedule.token_dropout)
     ids = torch.where(dropped & mask, UNK, ids)
     paths = [rows_of(table, episode) for episode in batch]

@@ -62,7 +62,7 @@ class AttackCost:
 
 def precisions(preset: Preset) -> list[tuple[Precision, Precision]]:
     """Precisions of vision and policy that are measured: float32 first, the default last."""
-    vision = default_precision(preset.vit.dim)
+    vision = default_precision(preset.vision.feature_size)
     policy = default_precision(preset.policy.hidden_size)
     either: list[tuple[Precision, Precision]] = [(vision, "float32"), ("float32", policy)]
     return list(dict.fromkeys([("float32", "float32"), *either, (vision, policy)]))

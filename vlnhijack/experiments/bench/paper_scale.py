@@ -10,13 +10,14 @@ from torch import Tensor
 
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent
+from vlnhijack.agents.clip import ClipConfig, ClipVisual
 from vlnhijack.agents.encoder import VitEncoder
 from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.observation import ObservationTable, observation_table
+from vlnhijack.agents.reader import Reader
 from vlnhijack.agents.trajectory import Instructions
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
-from vlnhijack.agents.vocabulary import Vocabulary
 from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective, attack_objective
 from vlnhijack.attack.projected_adam import ProjectedAdam
@@ -38,7 +39,7 @@ _LOOK = (64, 48)
 class Preset:
     """An agent's sizes, and its instructions: tokens ~ N(mean, deviation), `longest` at most."""
 
-    vit: VitConfig
+    vision: VitConfig | ClipConfig
     policy: HamtConfig
     mean: float
     deviation: float
@@ -48,8 +49,9 @@ class Preset:
 PRESETS = {
     "r2r": Preset(VitConfig(), HamtConfig(), mean=33, deviation=13, longest=60),
     "rxr": Preset(
-        VitConfig(patch=32),
+        ClipConfig(),
         HamtConfig(
+            image_feat_size=512,
             no_lang_ca=True,
             vocab_size=250002,
             max_position_embeddings=514,
@@ -95,13 +97,13 @@ class PaperScale:
         """The agent, frozen, its weights drawn by the seed."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seeds.integer(self.seed, "paper-scale agent"))
-            encoder, policy = (
-                VitEncoder(VisionTransformer(self.preset.vit)),
-                Hamt(self.preset.policy),
-            )
+            encoder = VitEncoder(_vision(self.preset.vision))
+            policy = Hamt(self.preset.policy)
         for model in (encoder, policy):
             model.eval().requires_grad_(False)
-        return Agent(encoder, policy, Vocabulary.build([]), {}, Path("random"))
+        return Agent(
+            encoder, policy, Reader(None, self.preset.policy.vocab_size), {}, Path("random")
+        )
 
     def problem(self, agent: Agent) -> tuple[AttackedViews, Objective]:
         """What the agent is attacked through; features of clean views are drawn by the seed."""
@@ -119,6 +121,10 @@ class PaperScale:
         used = used_texels(surface.uv, surface.faces, *surface.texture.shape[:2])
         original = torch.from_numpy(surface.texture)
         return ProjectedAdam(original, torch.from_numpy(used), epsilon=0.3)
+
+
+def _vision(config: VitConfig | ClipConfig) -> VisionTransformer | ClipVisual:
+    return ClipVisual(config) if isinstance(config, ClipConfig) else VisionTransformer(config)
 
 
 def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale()) -> PaperScale:

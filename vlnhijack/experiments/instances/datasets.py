@@ -7,7 +7,7 @@ from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import DatasetInstances
 from vlnhijack.experiments.instances.houses import rendered_places
 from vlnhijack.experiments.instances.rules import Place, Scan
-from vlnhijack.navigation.episode import Episode, stream_episodes
+from vlnhijack.navigation.episode import Episode, by_scan, stream_episodes
 from vlnhijack.navigation.graph import GraphFolder, NavigationGraph, load_graph
 from vlnhijack.scenes.categories import read_categories
 from vlnhijack.scenes.house_files import load_house
@@ -32,7 +32,7 @@ def load_scans(folder: Path, settings: DatasetInstances) -> list[Scan]:
     """
     graphs = _graphs(folder, settings)
     episodes = {
-        split: _by_scan(_episodes(folder, split, graphs, settings))
+        split: by_scan(_episodes(folder, split, graphs, settings))
         for split in ("train", "val_seen")
     }
     scans = sorted(episodes["val_seen"])
@@ -74,13 +74,6 @@ def _episodes(
         return
     names = [form.format(split) for form in _EPISODES[settings.dataset]]
     yield from stream_episodes(_find(folder, names, None, split), graphs, settings.languages)
-
-
-def _by_scan(episodes: Iterable[Episode]) -> dict[str, list[Episode]]:
-    found: dict[str, list[Episode]] = {}
-    for episode in episodes:
-        found.setdefault(episode.scan, []).append(episode)
-    return found
 
 
 def _box_places(

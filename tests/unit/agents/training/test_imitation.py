@@ -68,7 +68,7 @@ def student(given: World) -> tuple[Hamt, torch.optim.Optimizer]:
 
 
 def lessons(given: World) -> Lessons:
-    return Lessons(given.table, given.features, given.agent.vocabulary, given.episodes[::40])
+    return Lessons(given.table, given.features, given.agent.reader, given.episodes[::40])
 
 
 def learn(
