@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from tests.houses import tiny_house
+from vlnhijack.experiments.views import house_cameras
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.bake import bake
 from vlnhijack.rendering.gather import Points, direct_light, reflected_light
 from vlnhijack.rendering.mitsuba_scene import build_scene
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.scenes.house import House, Light
+from vlnhijack.scenes.house_files import load_house
 from vlnhijack.scenes.surface import Surface
 from vlnhijack.scenes.uv_atlas import used_texels
+from vlnhijack.settings import house_folder
 
 
 def _cameras() -> list[Camera]:
@@ -29,6 +32,16 @@ def test_baked_views_equal_path_traced_views() -> None:
     assert np.abs(difference).mean() < 0.012
     assert np.abs(difference.mean((0, 2, 3))).max() < 0.006
     assert traced.mean() > 0.15
+
+
+def test_the_shipped_lit_house_is_as_bright_as_its_baked_one() -> None:
+    houses = [load_house(house_folder(name)) for name in ("cedar", "cedar_lit")]
+    brightness = [
+        float(render_views(house, house_cameras(house.graph, 16, 12)[::24], spp).mean())
+        for house, spp in zip(houses, (16, 256), strict=True)
+    ]
+    assert brightness[0] == pytest.approx(brightness[1], abs=0.02)
+    assert 0.4 < brightness[0] < 0.6
 
 
 def test_the_lamp_stays_visible() -> None:

@@ -34,12 +34,19 @@ def evaluate(
     ] = "small",
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 16,
     seed: Annotated[int, typer.Option()] = 1,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(help="Measure this house alone and store its rates with the weights."),
+    ] = None,
 ) -> None:
     """Measure the clean agent on freshly rendered views, with the ablations."""
-    from vlnhijack.experiments.agent_eval import evaluate_agent
+    from vlnhijack.experiments.agent_eval import evaluate_agent, record_rates
 
     with progress_bars() as progress:
-        measured = evaluate_agent(agent, spp, seed, progress)
+        if record:
+            measured = {"val_seen_by_house": record_rates(agent, record, spp, seed, progress)}
+        else:
+            measured = evaluate_agent(agent, spp, seed, progress)
     _print_rates(measured)
 
 
@@ -49,9 +56,9 @@ def _print_rates(measured: dict) -> None:
     table = Table(title="clean agent, %")
     for column in ("episodes", "n", "SR", "OSR", "SPL", "nDTW"):
         table.add_column(column, justify="left" if column == "episodes" else "right")
-    rows = {f"val_seen, {name}": rates for name, rates in measured["val_seen"].items()}
-    rows["val_unseen"] = measured["val_unseen"]
-    rows |= {f"val_seen, {name}": rates for name, rates in measured["val_seen_by_house"].items()}
+    seen = {**measured.get("val_seen", {}), **measured["val_seen_by_house"]}
+    rows = {f"val_seen, {name}": rates for name, rates in seen.items()}
+    rows |= {key: measured[key] for key in ("val_unseen",) if key in measured}
     for name, rates in rows.items():
         values = (f"{100 * rates[key]:.1f}" for key in ("sr", "osr", "spl", "ndtw"))
         table.add_row(name, str(rates["n"]), *values)

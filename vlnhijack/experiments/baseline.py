@@ -73,7 +73,7 @@ def _recorded_rate(metadata: dict, weights: Path, scan: str) -> float:
         raise InputError(
             file=weights.with_suffix(".json"),
             field="metadata.val_seen_by_house",
-            expected=f"the clean rate in {scan}",
+            expected=f"the clean rate in {scan} (vlnhijack agent eval --record {scan})",
             received=", ".join(known) or "none",
         )
     return float(known[scan]["sr"])

@@ -17,6 +17,7 @@ from vlnhijack.experiments.yaml_config import Settings, SquareInt
 
 CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
 Kind = Literal["single_step", "trajectory"]
+Rung = Literal["frozen", "fixed-illumination", "prb"]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -116,7 +117,7 @@ class RenderSettings(Settings):
     takes besides the operator.
     """
 
-    rung: Literal["frozen", "fixed-illumination", "prb"] = "frozen"
+    rung: Rung = "frozen"
     attack_spp: SquareInt = 16
     evaluation_spp: SquareInt = 16
     refresh_every: NonNegativeInt = 0

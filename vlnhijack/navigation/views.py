@@ -3,6 +3,7 @@
 Row 0 looks 30° down, row 1 at the horizon, row 2 30° up; column k looks along heading k·30°.
 """
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ COLUMNS = 12
 ROWS = 3
 VIEWS = COLUMNS * ROWS
 STEP = 2 * np.pi / COLUMNS
+_RANGE = re.compile(r" *([0-9]{1,2}) *(?:- *([0-9]{1,2}) *)?")
 
 
 @dataclass(frozen=True, order=True)
@@ -31,6 +33,22 @@ def view_angles(index: int) -> tuple[float, float]:
         raise InputError(field="view", expected=f"an index in [0, {VIEWS})", received=index)
     row, column = divmod(index, COLUMNS)
     return column * STEP, (row - 1) * STEP
+
+
+def parse_views(text: str) -> list[int]:
+    """Indices of views, ascending, from a list such as "3,5,12-14"; InputError for other text."""
+    found: set[int] = set()
+    for part in text.split(","):
+        match = _RANGE.fullmatch(part)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (VIEWS, VIEWS)
+        if not first <= last < VIEWS:
+            raise InputError(
+                field="views",
+                expected=f"indices in [0, {VIEWS}), such as 0-35 or 3,5,12-14",
+                received=text,
+            )
+        found.update(range(first, last + 1))
+    return sorted(found)
 
 
 def nearest_view(heading: float) -> int:

@@ -11,6 +11,7 @@ So views do not leak into each other, and a pixel at the edge has samples on all
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,8 +44,11 @@ def border_of(film: Film) -> int:
 def views_sensor(cameras: Sequence[Camera], spp: int, film: Film = "box") -> Any:
     """A Mitsuba sensor of V cameras: float32 film (V·(height + 2·border), width + 2·border).
 
-    `sensor.aim(cameras)` points it at as many other cameras of the same size.
+    `sensor.aim(cameras)` points it at as many other cameras of the same size. Raises InputError
+    where spp is no square number, as the stratified sampler needs.
     """
+    if isqrt(spp) ** 2 != spp:
+        raise InputError(field="spp", expected="a square number", received=spp)
     width, height = image_size(cameras)
     mi = activate()
     _register()
@@ -78,14 +82,9 @@ class CameraRays(NamedTuple):
 
 
 def camera_rays(sensor: Any, seed: int, spp: int) -> CameraRays:
-    """The rays of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator).
-
-    Raises InputError where spp is no square number, as the stratified sampler needs.
-    """
+    """The rays of Mitsuba's AD integrators (mitsuba.ad.integrators.common, ADIntegrator)."""
     integrator = _ray_source()
-    sampler, drawn = integrator.prepare(sensor, seed, spp)
-    if drawn != spp:
-        raise InputError(field="spp", expected="a square number", received=spp)
+    sampler, _ = integrator.prepare(sensor, seed, spp)
     ray, _, position = integrator.sample_rays(sensor=sensor, scene=None, sampler=sampler)
     return CameraRays(ray, position, sampler)
 

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from vlnhijack.artifacts import atomic_path
 from vlnhijack.attack.optimise import Validation, best
@@ -20,6 +21,7 @@ from vlnhijack.report.style import (
     ATTACKED,
     CLEAN,
     FAINT,
+    HIGHLIGHT,
     INK,
     MUTED,
     RC,
@@ -32,6 +34,8 @@ Rows = Sequence[Mapping[str, float]]
 GUTTER = 6
 CAPTION = 18
 HEADER = 26
+SHEET_TILE = 160
+OUTLINE = 2
 SMOOTHING = 15
 
 
@@ -40,9 +44,23 @@ def save_image(path: Path, image: ArrayLike) -> None:
 
     Raises InputError for any other shape.
     """
-    picture = Image.fromarray(to_8bit(_pixels(image)))
-    with atomic_path(path) as temporary:
-        picture.save(temporary, optimize=True)
+    _save(Image.fromarray(to_8bit(_pixels(image))), path)
+
+
+def save_mask(path: Path, mask: NDArray[np.bool_]) -> None:
+    """Write a mask (h,w) as an 8-bit grey PNG, 255 where it is true, whole or not at all."""
+    _save(Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)), path)
+
+
+def outlined(image: ArrayLike, mask: NDArray[np.bool_]) -> Pixels:
+    """The image (h,w,3) with a yellow line around a mask (h,w), 2 pixels wide in a contact sheet.
+
+    The masked pixels themselves stay as they are.
+    """
+    pixels = _pixels(image)
+    wide = OUTLINE * max(1, round(pixels.shape[1] / SHEET_TILE))
+    line = binary_dilation(mask, np.ones((3, 3)), iterations=wide) & ~mask
+    return np.where(line[..., None], np.asarray(to_rgb(HIGHLIGHT), np.float32), pixels)
 
 
 def before_after(
@@ -88,7 +106,7 @@ def contact_sheet(
         raise InputError(field="images", expected="(V,3,h,w), V ≥ 1", received=views.shape)
     if labels is not None and len(labels) != len(views):
         raise InputError(field="labels", expected=len(views), received=len(labels))
-    tiles = [_tile(_pixels(view), 1, 160) for view in views]
+    tiles = [_tile(_pixels(view), 1, SHEET_TILE) for view in views]
     save_overview(_grid(tiles, min(columns, len(views)), labels), path)
 
 
@@ -107,6 +125,11 @@ def curve(path: Path, log: Rows, validations: Rows) -> None:
         _draw_ndtw(bottom, validations)
         figure.align_ylabels()
         save_figure(figure, path)
+
+
+def _save(picture: Image.Image, path: Path) -> None:
+    with atomic_path(path) as temporary:
+        picture.save(temporary, optimize=True)
 
 
 def _draw_losses(axes: Axes, log: Rows, validations: Rows) -> None:

@@ -7,6 +7,7 @@ from vlnhijack.navigation.views import (
     angle_features,
     nearest_view,
     panorama_cameras,
+    parse_views,
     view_angles,
 )
 
@@ -21,6 +22,20 @@ def test_rows_look_down_ahead_and_up() -> None:
 def test_an_index_outside_the_panorama_is_refused(index: int) -> None:
     with pytest.raises(InputError, match="view"):
         view_angles(index)
+
+
+@pytest.mark.parametrize(
+    ("text", "views"),
+    [("0-35", list(range(VIEWS))), ("7", [7]), ("12-14, 3,5,13", [3, 5, 12, 13, 14])],
+)
+def test_a_list_of_views_is_parsed(text: str, views: list[int]) -> None:
+    assert parse_views(text) == views
+
+
+@pytest.mark.parametrize("text", ["", "36", "-1", "5-3", "1-", "a", "1,,2", "0-36", "1.5"])
+def test_a_list_of_no_views_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="views: expected indices in .0, 36.*received"):
+        parse_views(text)
 
 
 def test_cameras_share_the_position_and_take_the_angles_of_the_views() -> None:

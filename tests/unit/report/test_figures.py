@@ -8,8 +8,15 @@ from PIL import Image
 
 from vlnhijack import seeds
 from vlnhijack.errors import InputError
-from vlnhijack.report.figures import before_after, contact_sheet, curve, save_image
-from vlnhijack.report.style import ATTACKED, CLEAN, INK
+from vlnhijack.report.figures import (
+    before_after,
+    contact_sheet,
+    curve,
+    outlined,
+    save_image,
+    save_mask,
+)
+from vlnhijack.report.style import ATTACKED, CLEAN, HIGHLIGHT, INK
 
 VIEWS = seeds.stream(0, "report views").random((5, 3, 72, 96)).astype(np.float32)
 
@@ -39,6 +46,21 @@ def test_refused_image_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\(3,h,w\)"):
         save_image(tmp_path / "a.png", VIEWS)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_mask_is_saved_as_it_is_and_outlined_outside(tmp_path: Path) -> None:
+    mask = np.zeros((72, 96), bool)
+    mask[20:40, 30:50] = True
+    save_mask(tmp_path / "a.png", mask)
+    saved = np.asarray(Image.open(tmp_path / "a.png"))
+    assert saved.dtype == np.uint8 and np.array_equal(saved, 255 * mask)
+    drawn, pixels = outlined(VIEWS[0], mask), VIEWS[0].transpose(1, 2, 0)
+    changed = (drawn != pixels).any(2)
+    ring = np.zeros_like(mask)
+    ring[18:42, 28:52] = True
+    assert np.array_equal(changed, ring & ~mask)
+    assert close_to(255 * drawn, HIGHLIGHT) >= changed.sum()
+    assert np.array_equal(outlined(VIEWS[0], np.zeros_like(mask)), pixels)
 
 
 def test_before_after_shows_both_and_the_doubled_difference(tmp_path: Path) -> None:
