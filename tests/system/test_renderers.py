@@ -15,6 +15,7 @@ from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.rendering.renderer import Renderer
+from vlnhijack.scenes.house import Light
 
 OBJECT = "cabinet_0"
 SPP = 16
@@ -142,3 +143,16 @@ def test_a_lit_house_is_shown_as_it_is_rendered() -> None:
     assert float((image - views).mean().abs()) < 0.005
     darker = render_views(replace(house, exposure=house.exposure / 4), cameras, 144, 6)
     assert float(darker.mean()) < 0.7 * float(views.mean())
+
+
+def test_a_lit_house_built_twice_renders_alike() -> None:
+    """The order of the lamps decides the paths of a seed."""
+    lit = tiny_house("lit")
+    lamps = [
+        Light((x, y, 2.45), (0.1, 0.0, 0.0), (0.0, -0.1, 0.0), (1.0 + x, 2.0 + y, 3.0))
+        for x in (-0.9, -0.3, 0.3, 0.9)
+        for y in (-1.0, 0.0, 1.0)
+    ]
+    cameras = [Camera((-1.2, -1.2, 1.5), 0.8, -0.4, 16, 12)]
+    first, *others = (render_views(replace(lit, lights=tuple(lamps)), cameras) for _ in range(3))
+    assert all(torch.equal(first, other) for other in others)

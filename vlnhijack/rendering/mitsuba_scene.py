@@ -39,14 +39,15 @@ def build_scene(house: House, filters: Filters = Filters()) -> MitsubaScene:
 
     Baked textures are `raw` radiance. Lit textures are handed over as linear albedo, because
     Mitsuba decodes sRGB only when it reads a file. It is loaded by one thread: parallel loading can
-    deadlock with Python's interpreter lock (Mitsuba issue 1649, Dr.Jit issue 524).
+    deadlock with Python's interpreter lock (Mitsuba issue 1649, Dr.Jit issue 524). Lights are
+    loaded one by one: nested, their order and thus the paths of a seed would be random.
     """
     mi = activate()
     content: dict[str, Any] = {"type": "scene"}
     for index, surface in enumerate(house.surfaces):
         content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind, filters)
     for index, light in enumerate(house.lights if house.kind == "lit" else ()):
-        content[f"light_{index}"] = _light(light)
+        content[f"light_{index}"] = mi.load_dict(_light(light))
     scene = mi.load_dict(content, parallel=False)
     return MitsubaScene(scene, _surface_of_shape(scene))
 
