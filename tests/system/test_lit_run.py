@@ -1,4 +1,4 @@
-"""A whole run in a tiny lit house: rate recorded, light renewed, attacked, checked, evaluated."""
+"""Whole runs in a tiny lit house: rate recorded, light renewed, attacked, checked, evaluated."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -112,3 +112,28 @@ def test_a_lit_house_is_attacked_under_renewed_light(
     assert (attacked.kind, attacked.exposure) == ("lit", HOUSE.exposure)
     change = attacked.surface("cabinet_0").texture - HOUSE.surface("cabinet_0").texture
     assert 0.005 < np.abs(change).max() <= 0.3
+
+
+def test_each_rung_of_a_list_attacks_as_it_does_alone(agent: Path, tmp_path: Path) -> None:
+    """Nothing but the rendering differs: same texture, same controls, same evaluation."""
+    options = ["--record", HOUSE.name, "--spp", "4"]
+    assert CliRunner().invoke(app, ["agent", "eval", str(agent), *options]).exit_code == 0
+    renewed = config(agent)
+    (fixed,) = renewed.renderings
+    prb = fixed.model_copy(update={"rung": "prb", "attack_spp": 4, "refresh_every": 0})
+    several = renewed.model_copy(update={"rendering": [prb, fixed]})
+    progress = Progress(disable=True)
+    alone = run(renewed, tmp_path / "alone", resume=False, progress=progress)
+    together = run(several, tmp_path / "together", resume=False, progress=progress)
+    assert list(together["single_step"]) == ["clean", "noise", prb.name, fixed.name]
+    for arm, same in (("clean", "clean"), ("noise", "noise"), ("attacked", fixed.name)):
+        assert alone["single_step"][arm] == together["single_step"][same]
+    (name,) = alone["attacks"]
+    loss = {key: row["loss_own_rays"] for key, row in together["attacks"].items()}
+    assert loss[f"{name}-{fixed.name}"] == alone["attacks"][name]["loss_own_rays"]
+    assert loss[f"{name}-{fixed.name}"] != loss[f"{name}-{prb.name}"]
+    first, second = (
+        load_house(tmp_path / where / "house").surface("cabinet_0").texture
+        for where in (f"alone/attacks/{name}", f"together/attacks/{name}-{fixed.name}")
+    )
+    np.testing.assert_array_equal(first, second)

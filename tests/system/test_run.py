@@ -17,7 +17,6 @@ from vlnhijack.settings import experiments_folder
 
 SHORT = ("attack.iterations=6", "attack.checkpoint_every=2", "rendering.evaluation_spp=4")
 LAST = 6
-RUNGS = ("frozen_16spp", "prb_1spp")
 
 
 def command(out: Path, *options: str) -> list[str]:
@@ -97,27 +96,6 @@ def test_bad_settings_end_in_one_line(tmp_path: Path, setting: str, names: list[
     assert len(done.stderr.strip().splitlines()) == 1
     assert all(name in done.stderr for name in names)
     assert not (tmp_path / "bad").exists()
-
-
-def test_a_list_of_renderings_attacks_with_each_and_evaluates_alike(
-    finished: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "several"
-    several = "rendering=[{evaluation_spp: 4}, {rung: prb, attack_spp: 1, evaluation_spp: 4}]"
-    done = run(out, "--set", several)
-    assert done.returncode == 0, done.stderr
-    found = textures(out)
-    alone = textures(finished)
-    assert set(found) == {f"{name}-{rung}" for name in alone for rung in RUNGS}
-    for name, texture in alone.items():
-        np.testing.assert_array_equal(found[f"{name}-frozen_16spp"], texture)
-    once, again = (pd.read_parquet(folder / "records.parquet") for folder in (finished, out))
-    same = again[again["rung"] != "prb_1spp"].reset_index(drop=True)
-    pd.testing.assert_frame_equal(once, same)
-    summary = json.loads((out / "summary.json").read_text())
-    for table in ("single_step", "trajectory", "original"):
-        assert list(summary[table]) == ["clean", "noise", *RUNGS]
-    assert {row["rung"] for row in summary["attacks"].values()} == set(RUNGS)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from vlnhijack.experiments.context import Context
 from vlnhijack.experiments.rungs import attack_renderer
 
 _SEEDS = 8
+_LEAST = 1e-6
 
 
 def overfitting(context: Context, attack: Attack) -> dict[str, Any]:
@@ -40,15 +41,16 @@ def loss_gap(loss: Callable[[int], float], own: int, *others: int) -> dict[str, 
     """What the loss at the seed `own` understates.
 
     loss_own_rays; loss_other_rays and deviation: mean and standard deviation over the other seeds;
-    gap: the difference as a share of loss_own_rays.
+    gap: the difference as a share of loss_own_rays (at least _LEAST nats).
     """
     at_own = loss(own)
     elsewhere = [loss(seed) for seed in others]
+    mean = float(np.mean(elsewhere))
     return {
         "loss_own_rays": at_own,
-        "loss_other_rays": float(np.mean(elsewhere)),
+        "loss_other_rays": mean,
         "deviation": float(np.std(elsewhere, ddof=1)),
-        "gap": float(np.mean(elsewhere)) / at_own - 1,
+        "gap": (mean - at_own) / max(at_own, _LEAST),
     }
 
 

@@ -77,7 +77,7 @@ def gradient(given: World) -> Tensor:
     """Of the summed negative log-probabilities of STOP at the ends of some walks."""
     features, episodes = given.features.clone().requires_grad_(), given.episodes[::17]
     policy = given.agent.policy
-    read = read_instructions(policy, given.agent.vocabulary, episodes)
+    read = read_instructions(policy, given.agent.reader, episodes)
     paths = [rows_of(given.table, episode) for episode in episodes]
     walked = trajectories(given.table, paths, [episode.heading for episode in episodes])
     past = history(policy, given.table, features, walked)

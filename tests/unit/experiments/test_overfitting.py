@@ -10,3 +10,4 @@ def test_the_gap_is_what_the_loss_at_own_rays_understates() -> None:
     assert loss_gap(losses.__getitem__, 7, 1, 2, 3) == pytest.approx(
         {"loss_own_rays": 2.0, "loss_other_rays": 2.5, "deviation": 0.25, "gap": 0.25}
     )
+    assert loss_gap(lambda seed: 0.0, 7, 1, 2)["gap"] == 0
