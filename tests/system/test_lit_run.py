@@ -116,7 +116,7 @@ def test_a_lit_house_is_attacked_under_renewed_light(
 
 def test_each_rung_of_a_list_attacks_as_it_does_alone(agent: Path, tmp_path: Path) -> None:
     """Nothing but the rendering differs: same texture, same controls, same evaluation."""
-    options = ["--record", HOUSE.name, "--spp", "4"]
+    options = ["--house", HOUSE.name, "--record", "--spp", "4"]
     assert CliRunner().invoke(app, ["agent", "eval", str(agent), *options]).exit_code == 0
     renewed = config(agent)
     (fixed,) = renewed.renderings
