@@ -135,14 +135,16 @@ def object_views(
 def attacked_views(
     context: Context, instance: AttackInstance, viewpoints: list[str] | None, stream: str
 ) -> AttackedViews:
-    """The object's views at the samples of the named stream; without bias but for "attack"."""
+    """The object's views at the samples of the named stream; exact but for "attack"."""
     house, settings = context.houses[instance.scan], context.config.rendering
     rows, views, cameras = object_views(context, instance, viewpoints)
-    make = attack_renderer if stream == "attack" else unbiased_renderer
+    is_attack = stream == "attack"
+    make = attack_renderer if is_attack else unbiased_renderer
+    agent = context.rounded_agent if is_attack else context.agent
     seed = context.seed("views", stream, instance.id)
     renderer = make(settings, house, instance.object_id, cameras, seed)
     clean = context.place(clean_features(context, instance.scan), instance.scan)
-    return AttackedViews(renderer, context.agent.encoder, clean, rows, views)
+    return AttackedViews(renderer, agent.encoder, clean, rows, views)
 
 
 def _texture(context: Context, instance: AttackInstance, original: np.ndarray) -> ProjectedAdam:
@@ -171,7 +173,8 @@ def _checkpointed(
     schedule = AttackSchedule(**settings.model_dump(exclude={"rendered_viewpoints"}))
     near = instance.target_path[: settings.rendered_viewpoints]
     views = attacked_views(context, instance, near, "attack")
-    objective = attack_objective(context.agent, context.table, instance, instance.train, views)
+    agent = context.rounded_agent
+    objective = attack_objective(agent, context.table, instance, instance.train, views)
     validation = attacked_views(context, instance, None, "validation")
     held_out = attack_objective(
         context.agent, context.table, instance, instance.validation, validation

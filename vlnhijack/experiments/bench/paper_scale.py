@@ -95,7 +95,10 @@ class PaperScale:
         """The agent, frozen, its weights drawn by the seed."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seeds.integer(self.seed, "paper-scale agent"))
-            encoder, policy = VitEncoder(VisionTransformer(self.preset.vit)), Hamt(self.preset.policy)
+            encoder, policy = (
+                VitEncoder(VisionTransformer(self.preset.vit)),
+                Hamt(self.preset.policy),
+            )
         for model in (encoder, policy):
             model.eval().requires_grad_(False)
         return Agent(encoder, policy, Vocabulary.build([]), {}, Path("random"))
@@ -106,9 +109,7 @@ class PaperScale:
         size = (len(self.table.index), VIEWS, agent.encoder.feature_size)
         clean = torch.randn(size, generator=generator)
         views = AttackedViews(self.renderer, agent.encoder, clean, self.viewpoints, self.views)
-        objective = attack_objective(
-            agent, self.table, self.instance, self.instance.train, views
-        )
+        objective = attack_objective(agent, self.table, self.instance, self.instance.train, views)
         with torch.no_grad():
             text = agent.policy.encode_text(self.tokens, self.mask)
         return views, replace(objective, instructions=Instructions(text, self.mask))
@@ -135,7 +136,9 @@ def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale())
         "bench", house.name, object_id, category, path[0], 0.0, tuple(path[1:]), episodes, (), ()
     )
     cameras = [
-        panorama_cameras(tuple(house.graph.positions[row].tolist()), scale.width, scale.height)[view]
+        panorama_cameras(tuple(house.graph.positions[row].tolist()), scale.width, scale.height)[
+            view
+        ]
         for row, view in zip(rows.tolist(), views.tolist(), strict=True)
     ]
     renderer = FrozenRenderer(house, object_id, cameras, scale.spp, seed)
