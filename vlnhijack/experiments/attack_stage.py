@@ -99,15 +99,17 @@ def object_views(
 def attacked_views(
     context: Context, attack: Attack, viewpoints: list[str] | None, stream: str
 ) -> AttackedViews:
-    """The object's views at the samples of the named stream; without bias but for "attack"."""
+    """The object's views at the samples of the named stream; exact but for "attack"."""
     instance = attack.instance
     house = context.houses[instance.scan]
     rows, views, cameras = object_views(context, instance, viewpoints)
-    make = attack_renderer if stream == "attack" else unbiased_renderer
+    is_attack = stream == "attack"
+    make = attack_renderer if is_attack else unbiased_renderer
+    agent = context.rounded_agent if is_attack else context.agent
     seed = context.seed("views", stream, instance.id)
     renderer = make(attack.rendering, house, instance.object_id, cameras, seed)
     clean = context.place(clean_features(context, instance.scan), instance.scan)
-    return AttackedViews(renderer, context.agent.encoder, clean, rows, views)
+    return AttackedViews(renderer, agent.encoder, clean, rows, views)
 
 
 def training(context: Context, attack: Attack) -> tuple[AttackedViews, Objective]:
@@ -115,7 +117,8 @@ def training(context: Context, attack: Attack) -> tuple[AttackedViews, Objective
     instance = attack.instance
     near = instance.target_path[: context.config.attack.rendered_viewpoints]
     views = attacked_views(context, attack, near, "attack")
-    return views, attack_objective(context.agent, context.table, instance, instance.train, views)
+    agent = context.rounded_agent
+    return views, attack_objective(agent, context.table, instance, instance.train, views)
 
 
 def _texture(context: Context, instance: AttackInstance, original: np.ndarray) -> ProjectedAdam:

@@ -42,8 +42,7 @@ def clean_features(context: Context, scan: str) -> Tensor:
 def made_by(context: Context, scan: str, spp: int, seed: int) -> str:
     """What the features of a clean house's views hang on."""
     agent, house = sha256(context.agent.path), sha256(house_folder(scan) / "house.json")
-    precision = context.precision["vision"]
-    return f"agent {agent}, {precision}, house {house}, {spp} spp, seed {seed}"
+    return f"agent {agent}, house {house}, {spp} spp, seed {seed}"
 
 
 def baseline(context: Context, scan: str) -> float:

@@ -132,7 +132,8 @@ class RenderSettings(Settings):
 
 
 class PrecisionSettings(Settings):
-    """In which the transformers multiply; see `default_precision` for what is not set."""
+    """In which the transformers multiply while a texture is optimised; validation and evaluation
+    are in float32. See `default_precision` for what is not set."""
 
     vision: Precision | None = None
     policy: Precision | None = None

@@ -1,7 +1,8 @@
 """What every stage of a run shares."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from torch import Tensor
 from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
-from vlnhijack.agents.precision import Precision, default_precision, set_precision
+from vlnhijack.agents.precision import default_precision, set_precision
 from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import (
     DrawnInstances,
@@ -45,15 +46,14 @@ class Context:
     def table(self) -> ObservationTable:
         return observation_table([house.graph for house in self.houses.values()])
 
-    @property
-    def precision(self) -> dict[str, Precision]:
-        """Of "vision" and "policy"."""
-        wanted, agent = self.config.precision, self.agent
-        width = agent.policy.config.hidden_size
-        return {
-            "vision": wanted.vision or default_precision(agent.encoder.feature_size),
-            "policy": wanted.policy or default_precision(width),
-        }
+    @cached_property
+    def rounded_agent(self) -> Agent:
+        """The agent that textures are optimised on, at the precisions of the experiment."""
+        wanted = self.config.precision
+        encoder, policy = deepcopy((self.agent.encoder, self.agent.policy))
+        set_precision(encoder, wanted.vision or default_precision(encoder.feature_size))
+        set_precision(policy, wanted.policy or default_precision(policy.config.hidden_size))
+        return replace(self.agent, vision=encoder, policy=policy)
 
     def rows(self, scan: str) -> slice:
         """Rows of a scan's viewpoints in the table and in feature tensors."""
@@ -92,7 +92,7 @@ class Context:
 
 
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
-    """Load the agent, at the precisions of the experiment, and the houses that it names.
+    """Load the agent and the houses that the experiment names.
 
     Raises InputError where the agent has no recorded rate in a house or cannot read its episodes.
     """
@@ -101,10 +101,7 @@ def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> 
     for house in houses.values():
         recorded_rate(agent, house.name)
         agent.reader(episodes_of(house, "val_seen"))
-    context = Context(config, folder, progress, agent, houses)
-    set_precision(agent.encoder, context.precision["vision"])
-    set_precision(agent.policy, context.precision["policy"])
-    return context
+    return Context(config, folder, progress, agent, houses)
 
 
 def recorded_rate(agent: Agent, scan: str) -> float:
