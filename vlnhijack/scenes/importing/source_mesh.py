@@ -1,14 +1,12 @@
 """A textured mesh as its file holds it, before it becomes a house."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vlnhijack.errors import InputError
-
-Wrap = Literal["repeat", "clamp", "mirror"]
+from vlnhijack.scenes.surface import Wrap
 
 BACKGROUND = -1
 SMALLEST, LARGEST = 0.5, 500.0
@@ -16,7 +14,7 @@ SMALLEST, LARGEST = 0.5, 500.0
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A look: image (H,W,3) uint8 display values, or none, times colour (r, g, b) in [0,1].
+    """A look: image (H,W,3) uint8 or, where there is none, colour (r, g, b); display values.
 
     wrap says what lies beyond the image's borders.
     """
