@@ -121,7 +121,9 @@ def triangles(path: Path, elements: Elements) -> NDArray[np.int32]:
 
 
 def _block(named: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
-    kinds = [(name, values.dtype.newbyteorder("<"), values.shape[1:]) for name, values in named.items()]
+    kinds = [
+        (name, values.dtype.newbyteorder("<"), values.shape[1:]) for name, values in named.items()
+    ]
     block = np.empty(len(next(iter(named.values()))), np.dtype(kinds))
     for name, values in named.items():
         block[name] = values

@@ -50,7 +50,7 @@ def test_what_is_far_from_every_segment_has_no_object() -> None:
     kept = owner != 1
     found, quality = match_objects(corners[kept], owner[kept], corners, nothing)
     centres = corners.mean(1)
-    top = ~kept & (centres[:, 2] > 0.99) & (np.abs(centres[:, :2] + [1.5, 1.0]).max(1) < 0.35)
+    top = ~kept & (centres[:, 2] > 0.99) & (np.abs(centres[:, :2] + [0.5, 1.0]).max(1) < 0.35)
     assert top.any()
     assert (found[top] == -1).all()
     assert quality.within_reach < 1
