@@ -56,7 +56,10 @@ def write_elements(
     face: Mapping[str, NDArray[np.generic]],
 ) -> None:
     """Write named columns (N,) of vertices, faces (F,3), and further columns (F,) of faces."""
-    corners = {"count": np.full(len(faces), 3, np.uint8), CORNERS: faces.astype(np.int32)}
+    corners: dict[str, NDArray[np.generic]] = {
+        "count": np.full(len(faces), 3, np.uint8),
+        CORNERS: faces.astype(np.int32),
+    }
     vertex_block, face_block = _block(vertex), _block(corners | dict(face))
     header = [*_START, f"element vertex {len(vertex_block)}", *_properties(vertex)]
     header += [f"element face {len(face_block)}", f"property list uchar int {CORNERS}"]

@@ -6,8 +6,8 @@
     O object region category  px py pz  a0x a0y a0z  a1x a1y a1z  r0 r1 r2  0 0 0 0 0 0 0 0
     E segment object id area  px py pz  xlo ylo zlo xhi yhi zhi  0 0 0 0 0
 
-An index counts from 0, -1 stands for none; `#` in a label is a space. Segments are only counted; the
-lines of levels, panoramas, images, portals and outlines (L, P, I, S, V) are passed over.
+An index counts from 0, -1 stands for none; `#` in a label is a space. Segments are only counted;
+the lines of levels, panoramas, images, portals and outlines (L, P, I, S, V) are passed over.
 """
 
 from collections.abc import Sequence

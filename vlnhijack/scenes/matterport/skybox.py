@@ -1,9 +1,9 @@
-"""Panoramas of a scan: six square images of a viewpoint, and the views that MatterSim cuts from them.
+"""Panoramas of a scan: six square images of a viewpoint, and MatterSim's views of them.
 
 The images look up, ahead, to the right, back, to the left and down. A viewpoint's pose turns their
-axes to the world: x to the left, y down, z back from what lies ahead. MatterSim halves them (512²
-`<viewpoint>_skybox_small.jpg`), and looks each pixel up in an OpenGL cube map: linear filter, clamped
-at the borders of each image, 8 bits (Matterport3DSimulator, src/lib/MatterSim.cpp, NavGraph.cpp).
+axes to the world: x to the left, y down, z back from what lies ahead. MatterSim halves them (512²,
+`<viewpoint>_skybox_small.jpg`) and looks each pixel up in an OpenGL cube map: linear filter, each
+image clamped at its borders, 8 bits (Matterport3DSimulator, src/lib/MatterSim.cpp, NavGraph.cpp).
 """
 
 import io
