@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from vlnhijack.scenes.importing.lookup import look_up
 from vlnhijack.scenes.surface import Wrap
 
-LARGEST = 8192
-_FINEST = 32
+LARGEST = 4096
 
 
 def bake_patches(
@@ -34,13 +33,13 @@ def bake_patches(
     order = (turn[:, None] + np.arange(3)) % 3
     colours = np.take_along_axis(corner_colours, order[..., None], 1)
     uv = np.take_along_axis(corner_uv, order[..., None], 1)
-    for row in range(size):
-        for column in range(size):
-            b, c = column / (size - 1), row / (size - 1)
-            weights = np.array([1 - b - c, b, c], np.float32)
-            shown = look_up(texture, np.einsum("c,fcd->fd", weights, uv), wrap)
-            shown *= np.einsum("c,fcd->fd", weights, colours).clip(0, 1)
-            baked[rows * size + row, columns * size + column] = shown
+    b = np.linspace(0, 1, size, dtype=np.float32)
+    for row, c in enumerate(b):
+        weights = np.stack([1 - b - c, b, np.full_like(b, c)])
+        shown = look_up(texture, np.einsum("cs,fcd->fsd", weights, uv).reshape(-1, 2), wrap)
+        shown *= np.einsum("cs,fcd->fsd", weights, colours).clip(0, 1).reshape(-1, 3)
+        at = columns[:, None] * size + np.arange(size)
+        baked[rows[:, None] * size + row, at] = shown.reshape(count, size, 3)
     return baked, _patch_uv(rows, columns, size, baked.shape, turn)
 
 
@@ -50,8 +49,8 @@ def _patch_size(corner_uv: NDArray[np.float32], texture: NDArray[np.float32]) ->
         return 2
     texels = corner_uv * texture.shape[1::-1]
     longest = np.linalg.norm(texels - np.roll(texels, 1, axis=1), axis=-1).max(axis=1)
-    fits = int(LARGEST / np.sqrt(len(corner_uv)))
-    return int(np.clip(np.ceil(np.quantile(longest, 0.9)) + 1, 2, min(max(fits, 2), _FINEST)))
+    fits = max(2, int(LARGEST / np.ceil(np.sqrt(len(corner_uv)))))
+    return int(np.clip(np.ceil(np.quantile(longest, 0.9)) + 1, 2, fits))
 
 
 def _least_clipped(colours: NDArray[np.float32]) -> NDArray[np.int64]:
