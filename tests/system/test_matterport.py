@@ -4,13 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.progress import Progress
 
 from tests.houses import tiny_house
+from vlnhijack.experiments.import_scan import import_scan
 from vlnhijack.navigation.graph import load_graph
 from vlnhijack.navigation.views import panorama_cameras
+from vlnhijack.rendering.coverage import object_pixels
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.rendering.skybox import skybox_images
 from vlnhijack.scenes.house import House
+from vlnhijack.scenes.house_files import load_house
+from vlnhijack.scenes.importing.unwrapping import unwrapped
 from vlnhijack.scenes.matterport.export import export_scan
 from vlnhijack.scenes.matterport.skybox import read_skybox, skybox_view
 
@@ -44,3 +49,51 @@ def test_the_skybox_shows_what_the_house_does(house: House, scan: Path) -> None:
         assert psnr(shown, rendered) > 30
         turned = np.roll(rendered, 1, axis=0)
         assert psnr(shown, turned) < 20
+
+
+@pytest.fixture(scope="module")
+def imported(scan: Path, tmp_path_factory: pytest.TempPathFactory) -> House:
+    folder = tmp_path_factory.mktemp("houses") / "again"
+    with Progress(disable=True) as progress:
+        lines = import_scan(
+            scan, scan.parent / "connectivity", folder, allow_missing=False, progress=progress
+        )
+    assert "100.00% of the faces are within 0.10 m" in lines[1]
+    return load_house(folder)
+
+
+def test_the_objects_are_the_same(house: House, imported: House) -> None:
+    assert imported.name == house.name
+    for number, thing in enumerate(house.objects):
+        again = imported.object(str(number))
+        assert again.category == thing.category
+        assert imported.rooms[0].label == house.rooms[0].label
+        np.testing.assert_allclose(again.centre, thing.centre, atol=1e-5)
+        np.testing.assert_allclose(again.size, thing.size, atol=1e-5)
+        faces = sum(len(part.faces) for part in imported.parts(str(number)))
+        assert faces == len(house.surface(thing.id).faces)
+    assert len(imported.objects) == len(house.objects)
+
+
+def test_the_graph_is_the_same(house: House, imported: House) -> None:
+    assert imported.graph.viewpoints == house.graph.viewpoints
+    np.testing.assert_allclose(imported.graph.positions, house.graph.positions)
+    assert np.array_equal(imported.graph.adjacency, house.graph.adjacency)
+    np.testing.assert_allclose(imported.graph.heights, house.graph.heights)
+
+
+def test_it_looks_the_same_but_for_jpeg(house: House, imported: House) -> None:
+    x, y, z = house.graph.positions[1].tolist()
+    cameras = panorama_cameras((x, y, z), 64, 48)
+    shown, again = (render_views(each, cameras, 16).numpy() for each in (house, imported))
+    assert psnr(shown, again) > 35
+    assert object_pixels(imported, cameras).sum() == object_pixels(house, cameras).sum()
+
+
+def test_an_object_of_a_scan_can_be_unwrapped(imported: House) -> None:
+    x, y, z = imported.graph.positions[1].tolist()
+    cameras = panorama_cameras((x, y, z), 64, 48)
+    ready = unwrapped(imported, ["0"])
+    shown, again = (render_views(each, cameras, 16).numpy() for each in (imported, ready))
+    assert psnr(shown, again) > 35
+    assert ready.surface("0").texture.shape[0] >= 64

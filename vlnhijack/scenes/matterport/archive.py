@@ -42,6 +42,7 @@ def unpack(archive: Path, folder: Path) -> None:
                     expected="files inside the folder",
                     received=info.filename,
                 )
+        folder.mkdir(parents=True, exist_ok=True)
         needed, free = sum(info.file_size for info in infos), shutil.disk_usage(folder).free
         if needed > free:
             raise InputError(
