@@ -12,7 +12,7 @@ from vlnhijack.scenes.matterport.export import export_scan
 
 def tiny_scan(folder: Path) -> Path:
     """The folder of the scan; its graph is in `connectivity` beside it."""
-    return export_scan(tiny_house(), folder, {})
+    return export_scan(tiny_house(), folder, [])
 
 
 def pack(scan: Path) -> None:

@@ -4,19 +4,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from rich.progress import Progress
+from typer.testing import CliRunner
 
 from tests.houses import tiny_house
-from vlnhijack.experiments.import_scan import import_scan
+from tests.scans import import_quietly
+from vlnhijack.cli import app
+from vlnhijack.experiments.export_house import export_house
 from vlnhijack.navigation.graph import load_graph
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.coverage import object_pixels
 from vlnhijack.rendering.observe import render_views
-from vlnhijack.rendering.skybox import skybox_images
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import load_house
+from vlnhijack.scenes.house_files import load_house, save_house
 from vlnhijack.scenes.importing.unwrapping import unwrapped
-from vlnhijack.scenes.matterport.export import export_scan
 from vlnhijack.scenes.matterport.skybox import read_skybox, skybox_view
 
 EDGE = 256
@@ -33,9 +35,10 @@ def house() -> House:
 
 @pytest.fixture(scope="module")
 def scan(house: House, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    places = zip(house.graph.viewpoints, house.graph.positions.tolist(), strict=True)
-    skyboxes = {name: skybox_images(house, (x, y, z), EDGE) for name, (x, y, z) in places}
-    return export_scan(house, tmp_path_factory.mktemp("export"), skyboxes)
+    folder = tmp_path_factory.mktemp("export")
+    save_house(house, folder / "house")
+    with Progress(disable=True) as progress:
+        return export_house(folder / "house", folder, EDGE, progress)
 
 
 def test_the_skybox_shows_what_the_house_does(house: House, scan: Path) -> None:
@@ -54,11 +57,7 @@ def test_the_skybox_shows_what_the_house_does(house: House, scan: Path) -> None:
 @pytest.fixture(scope="module")
 def imported(scan: Path, tmp_path_factory: pytest.TempPathFactory) -> House:
     folder = tmp_path_factory.mktemp("houses") / "again"
-    with Progress(disable=True) as progress:
-        lines = import_scan(
-            scan, scan.parent / "connectivity", folder, allow_missing=False, progress=progress
-        )
-    assert "100.00% of the faces are within 0.10 m" in lines[1]
+    assert "100.00% of the faces are within 0.10 m" in " ".join(import_quietly(scan, folder))
     return load_house(folder)
 
 
@@ -97,3 +96,16 @@ def test_an_object_of_a_scan_can_be_unwrapped(imported: House) -> None:
     shown, again = (render_views(each, cameras, 16).numpy() for each in (imported, ready))
     assert psnr(shown, again) > 35
     assert ready.surface("0").texture.shape[0] >= 64
+
+
+def test_panoramas_are_written_as_mattersim_shows_them(scan: Path, tmp_path: Path) -> None:
+    graph = load_graph(scan.parent / "connectivity", scan.name)
+    arguments = ["house", "panoramas", str(scan), "--out", str(tmp_path), "--viewpoint"]
+    arguments += [graph.viewpoints[1], "--connectivity", str(scan.parent / "connectivity")]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    files = sorted(tmp_path.iterdir())
+    assert [f.name for f in files] == [f"{graph.viewpoints[1]}_{i:02d}.png" for i in range(36)]
+    images, camera = read_skybox(scan, graph.viewpoints[1]), panorama_cameras((0, 0, 0), 640, 480)
+    with Image.open(files[14]) as image:
+        assert np.array_equal(image, skybox_view(images, graph.rotations[1], camera[14]))

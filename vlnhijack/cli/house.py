@@ -5,9 +5,16 @@ from typing import Annotated
 
 import typer
 
+from vlnhijack.cli import house_scan
 from vlnhijack.cli.console import console, progress_bars
 
 app = typer.Typer(no_args_is_help=True, help="Make houses.")
+importing = typer.Typer(no_args_is_help=True, help="Make a house of a scan or a mesh.")
+importing.command()(house_scan.mp3d)
+app.add_typer(importing, name="import")
+app.command()(house_scan.export)
+app.command()(house_scan.panoramas)
+app.command()(house_scan.coverage)
 
 
 @app.command()

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from vlnhijack.errors import InputError
-from vlnhijack.navigation.graph import GraphFolder, NavigationGraph
+from vlnhijack.navigation.graph import scan_graph
 from vlnhijack.scenes.house_files import check_name, save_house
 from vlnhijack.scenes.importing.assemble import assemble
 from vlnhijack.scenes.importing.mesh_file import ReadOptions, read_mesh
@@ -28,7 +27,7 @@ def import_scan(
     with scan_files(scan) as files:
         name = files.name
         check_name(name, scan)
-        graph = _graph(connectivity, name)
+        graph = scan_graph(connectivity, name)
         listed = read_house_file(files.segmentation / f"{name}.house")
         progress.update(task, advance=1, description=f"{name}: segmentation")
         segments = read_segmentation(files.segmentation, name, len(listed.objects))
@@ -57,12 +56,3 @@ def import_scan(
     ]
     lines += [f"objects without faces, left out: {', '.join(map(str, lost))}"] if lost else []
     return lines + list(read.notes)
-
-
-def _graph(connectivity: Path, scan: str) -> NavigationGraph:
-    graphs = GraphFolder(connectivity)
-    if scan not in graphs:
-        raise InputError(
-            file=connectivity, expected=f"{scan}_connectivity.json", received="no such file"
-        )
-    return graphs[scan]

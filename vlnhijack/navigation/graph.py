@@ -166,6 +166,14 @@ class GraphFolder(Mapping[str, NavigationGraph]):
         return _graph(scan, parse_json(self._texts[name], path), path)
 
 
+def scan_graph(source: Path, scan: str) -> NavigationGraph:
+    """The graph of a scan in a folder or archive; InputError where it has none."""
+    graphs = GraphFolder(source)
+    if scan not in graphs:
+        raise InputError(file=source, expected=f"{scan}{_SUFFIX}", received="no such file")
+    return graphs[scan]
+
+
 def _archived(source: Path) -> dict[str, bytes]:
     """The connectivity files of an archive by name, unparsed."""
     try:

@@ -7,7 +7,7 @@ connectivity/<name>_connectivity.json, scans.txt
 """
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from vlnhijack.scenes.surface import Surface
 QUALITY = 95
 
 
-def export_scan(house: House, folder: Path, skyboxes: Mapping[str, Images]) -> Path:
+def export_scan(house: House, folder: Path, skyboxes: Iterable[tuple[str, Images]]) -> Path:
     """Write a baked house, and the six images (6,N,N,3) of viewpoints; the folder of the scan.
 
     Objects are numbered in the order of the house. The poses of the graph become upright, as the
@@ -47,7 +47,7 @@ def export_scan(house: House, folder: Path, skyboxes: Mapping[str, Images]) -> P
     with atomic_folder(folder / house.name) as new:
         _write_mesh(house, new / "matterport_mesh" / house.name)
         _write_segmentation(house, new / "house_segmentations")
-        for viewpoint, images in skyboxes.items():
+        for viewpoint, images in skyboxes:
             for side, image in enumerate(images):
                 _write_jpeg(new / PART / f"{viewpoint}_skybox{side}_sami.jpg", image)
     upright = replace(house.graph, rotations=UPRIGHT[None])
