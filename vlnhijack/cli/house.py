@@ -1,13 +1,15 @@
-"""`vlnhijack house`: make houses."""
+"""`vlnhijack house`: make houses, import them, look at them."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from vlnhijack.cli import house_import
 from vlnhijack.cli.console import console, progress_bars
 
-app = typer.Typer(no_args_is_help=True, help="Make houses.")
+app = typer.Typer(no_args_is_help=True, help="Make houses, import them, look at them.")
+app.add_typer(house_import.app, name="import")
 
 
 @app.command()
@@ -31,3 +33,15 @@ def make(
             name, seed, folder, lit=lit, spp=spp, unseen=unseen, progress=progress
         )
     console.print(made)
+
+
+@app.command()
+def unwrap(
+    house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
+    objects: Annotated[list[str] | None, typer.Argument(help="Ids; all by default.")] = None,
+) -> None:
+    """Give objects of an imported house textures of their own, so that they can be attacked."""
+    from vlnhijack.experiments.import_house import unwrap_folder
+    from vlnhijack.settings import house_folder
+
+    unwrap_folder(house_folder(house), objects or [])
