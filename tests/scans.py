@@ -6,7 +6,9 @@ from pathlib import Path
 from rich.progress import Progress
 
 from tests.houses import tiny_house
+from vlnhijack.experiments.import_house import ImportOptions
 from vlnhijack.experiments.import_scan import import_scan
+from vlnhijack.scenes.importing.mesh_file import ReadOptions
 from vlnhijack.scenes.matterport.export import export_scan
 
 
@@ -27,11 +29,6 @@ def pack(scan: Path) -> None:
 
 def import_quietly(scan: Path, folder: Path, *, allow_missing: bool = False) -> list[str]:
     """`import_scan` without progress bars, with the graph beside the scan."""
+    options = ImportOptions(ReadOptions(up="z", allow_missing=allow_missing))
     with Progress(disable=True) as progress:
-        return import_scan(
-            scan,
-            scan.parent / "connectivity",
-            folder,
-            allow_missing=allow_missing,
-            progress=progress,
-        )
+        return import_scan(scan, scan.parent / "connectivity", folder, options, progress)

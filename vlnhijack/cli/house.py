@@ -1,17 +1,15 @@
-"""`vlnhijack house`: make houses."""
+"""`vlnhijack house`: make houses, import them, look at them."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vlnhijack.cli import house_scan
+from vlnhijack.cli import house_import, house_scan
 from vlnhijack.cli.console import console, progress_bars
 
-app = typer.Typer(no_args_is_help=True, help="Make houses.")
-importing = typer.Typer(no_args_is_help=True, help="Make a house of a scan or a mesh.")
-importing.command()(house_scan.mp3d)
-app.add_typer(importing, name="import")
+app = typer.Typer(no_args_is_help=True, help="Make houses, import them, look at them.")
+app.add_typer(house_import.app, name="import")
 app.command()(house_scan.export)
 app.command()(house_scan.panoramas)
 app.command()(house_scan.coverage)
@@ -38,3 +36,15 @@ def make(
             name, seed, folder, lit=lit, spp=spp, unseen=unseen, progress=progress
         )
     console.print(made)
+
+
+@app.command()
+def unwrap(
+    house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
+    objects: Annotated[list[str] | None, typer.Argument(help="Ids; all by default.")] = None,
+) -> None:
+    """Give objects of an imported house textures of their own, so that they can be attacked."""
+    from vlnhijack.experiments.import_house import unwrap_folder
+    from vlnhijack.settings import house_folder
+
+    unwrap_folder(house_folder(house), objects or [])

@@ -1,7 +1,7 @@
 """`vlnhijack house import mp3d`, `export`, `panoramas`, `coverage`: houses and Matterport3D."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,19 +16,29 @@ def mp3d(
     scan: Annotated[Path, typer.Argument(help="Folder of a scan, its parts plain or zipped.")],
     connectivity: Connectivity,
     out: Annotated[Path | None, typer.Option(help="Folder; scenes/<scan> by default.")] = None,
+    unwrap: Annotated[
+        Literal["attacked", "all"],
+        typer.Option(help="When objects get textures of their own: when attacked, or all now."),
+    ] = "attacked",
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Flat colours for missing or broken images.")
     ] = False,
+    seed: Annotated[int, typer.Option(help="Of the episodes.")] = 0,
 ) -> None:
     """Make a house of a Matterport3D scan."""
+    from vlnhijack.experiments.import_house import ImportOptions
     from vlnhijack.experiments.import_scan import import_scan
+    from vlnhijack.scenes.importing.mesh_file import ReadOptions
     from vlnhijack.settings import scenes_folder
 
+    options = ImportOptions(
+        read=ReadOptions(up="z", allow_missing=allow_missing),
+        unwrap_all=unwrap == "all",
+        seed=seed,
+    )
     folder = out or scenes_folder() / scan.resolve().name
     with progress_bars() as progress:
-        lines = import_scan(
-            scan, connectivity, folder, allow_missing=allow_missing, progress=progress
-        )
+        lines = import_scan(scan, connectivity, folder, options, progress)
     for line in lines:
         console.print(line)
 

@@ -136,7 +136,11 @@ class AttackSettings(Settings):
 
 
 class ExperimentConfig(Settings):
-    """An experiment: an agent, attacks on it, and how they are made."""
+    """An experiment: an agent, attacks on it, and how they are made.
+
+    baseline_sr: the clean success rate to ask for in houses that the agent's weights record none
+    for, such as imported ones.
+    """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
     note: str = ""
@@ -147,6 +151,7 @@ class ExperimentConfig(Settings):
     rules: InstanceRules = InstanceRules()
     rendering: RenderSettings = RenderSettings()
     attack: AttackSettings = AttackSettings()
+    baseline_sr: Share | None = None
 
     @field_validator("instances")
     @classmethod

@@ -1,58 +1,75 @@
-"""Make a house of a Matterport3D scan."""
+"""Make a house folder of a Matterport3D scan."""
 
+import time
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.progress import Progress
 
+from vlnhijack.experiments.import_house import ImportOptions, Stages, write_house
 from vlnhijack.navigation.graph import scan_graph
-from vlnhijack.scenes.house_files import check_name, save_house
-from vlnhijack.scenes.importing.assemble import assemble
-from vlnhijack.scenes.importing.mesh_file import ReadOptions, read_mesh
+from vlnhijack.scenes.house_files import check_name
+from vlnhijack.scenes.importing.mesh_file import read_mesh
+from vlnhijack.scenes.importing.source_mesh import SourceMesh
 from vlnhijack.scenes.matterport.house_file import read_house_file
 from vlnhijack.scenes.matterport.labels import label
-from vlnhijack.scenes.matterport.matching import REACH, match_objects
+from vlnhijack.scenes.matterport.matching import REACH, MatchQuality, match_objects
 from vlnhijack.scenes.matterport.scan_files import scan_files
-from vlnhijack.scenes.matterport.segmentation import read_segmentation
+from vlnhijack.scenes.matterport.segmentation import Segmentation, read_segmentation
+
+STAGES = 8
 
 
 def import_scan(
-    scan: Path, connectivity: Path, folder: Path, *, allow_missing: bool, progress: Progress
+    scan: Path, connectivity: Path, folder: Path, options: ImportOptions, progress: Progress
 ) -> list[str]:
-    """Write the house of a scan to `folder`; lines about it.
+    """Write the house of a scan to `folder`, as a whole or not at all; lines about it.
 
-    connectivity: a folder or archive of graphs. Raises InputError, and writes nothing, where a file
-    is missing or broken.
+    connectivity: a folder or archive of graphs; of the options, the labels play no part.
     """
-    task = progress.add_task(f"{scan.name}: files", total=5)
+    started = time.perf_counter()
+    stages = Stages(progress, scan.resolve().name, STAGES)
+    stages.next("files")
     with scan_files(scan) as files:
-        name = files.name
-        check_name(name, scan)
-        graph = scan_graph(connectivity, name)
-        listed = read_house_file(files.segmentation / f"{name}.house")
-        progress.update(task, advance=1, description=f"{name}: segmentation")
-        segments = read_segmentation(files.segmentation, name, len(listed.objects))
-        progress.update(task, advance=1, description=f"{name}: mesh")
-        read = read_mesh(files.mesh, ReadOptions(up="z", allow_missing=allow_missing))
-    progress.update(task, advance=1, description=f"{name}: objects")
-    matching = progress.add_task(f"{name}: faces matched", total=len(read.mesh.faces))
-    corners = read.mesh.vertices[read.mesh.faces]
-    face_object, quality = match_objects(
+        check_name(files.name, scan)
+        graph = scan_graph(connectivity, files.name)
+        listed = read_house_file(files.segmentation / f"{files.name}.house")
+        stages.next("segmentation")
+        segments = read_segmentation(files.segmentation, files.name, len(listed.objects))
+        stages.next("mesh")
+        read = read_mesh(files.mesh, options.read)
+    stages.next("objects")
+    face_object, quality = _match(segments, read.mesh, progress)
+    mesh, rooms, lost = label(read.mesh, listed, face_object)
+    lines = write_house(mesh, rooms, graph, folder, options, stages)
+    without = f"objects without faces, left out: {', '.join(map(str, lost)) or 'none'}"
+    seconds = time.perf_counter() - started
+    return [
+        *read.notes,
+        _describe(quality, segments.agreement),
+        without,
+        *lines,
+        f"{folder}: {seconds:.0f} s",
+    ]
+
+
+def _match(
+    segments: Segmentation, mesh: SourceMesh, progress: Progress
+) -> tuple[NDArray[np.int32], MatchQuality]:
+    task = progress.add_task("faces matched", total=len(mesh.faces))
+    corners = mesh.vertices[mesh.faces]
+    return match_objects(
         segments.corners,
         segments.face_object,
         corners,
-        lambda faces: progress.advance(matching, faces),
+        lambda faces: progress.advance(task, faces),
     )
-    mesh, rooms, lost = label(read.mesh, listed, face_object)
-    progress.update(task, advance=1, description=f"{name}: house")
-    house = assemble(mesh, name, graph, rooms)
-    save_house(house, folder)
-    progress.update(task, advance=1)
-    lines = [
-        f"{folder}: {len(rooms)} rooms, {len(house.objects)} objects, {len(mesh.faces)} faces, "
-        f"{len(mesh.materials)} materials, {len(graph.viewpoints)} viewpoints",
+
+
+def _describe(quality: MatchQuality, agreement: float) -> str:
+    return (
         f"match: {quality.within_reach:.2%} of the faces are within {REACH:.2f} m of the "
-        f"segmentation; half are within {1000 * quality.median:.1f} mm, 95 % within "
-        f"{1000 * quality.high:.1f} mm; its files agree on {segments.agreement:.2%}",
-    ]
-    lines += [f"objects without faces, left out: {', '.join(map(str, lost))}"] if lost else []
-    return lines + list(read.notes)
+        f"segmentation, half within {1000 * quality.median:.1f} mm, 95 % within "
+        f"{1000 * quality.high:.1f} mm; its files agree on {agreement:.2%} of its faces"
+    )

@@ -46,7 +46,8 @@ _LABELS = TypeAdapter(_Labels)
 def label_by_name(read: MeshFile) -> Labelled:
     """Objects are the nodes whose names hold a word for one, such as Office_Chair.003.
 
-    A node without such a word belongs to the nearest ancestor with one, else to the background.
+    A node belongs to the nearest of itself and its ancestors with such a word, and on to a parent
+    with a word for the same thing; to the background if there is none.
     The one room of the house is the extent of the mesh.
     """
     named = [_named(node) for node in read.nodes]
@@ -87,12 +88,14 @@ def label_by_file(read: MeshFile, file: Path) -> Labelled:
 
 
 def _named(node: Sequence[str]) -> tuple[str, str] | None:
-    """The node or ancestor with a word for an object, and its category."""
-    for name in node:
-        category = _category(name)
-        if category is not None:
-            return name, category
-    return None
+    """The node or ancestor that is an object, and its category; the whole where parts say it too."""
+    categories = [_category(name) for name in node]
+    found = next((row for row, category in enumerate(categories) if category is not None), None)
+    if found is None:
+        return None
+    while categories[found + 1 : found + 2] == [categories[found]]:
+        found += 1
+    return node[found], str(categories[found])
 
 
 def _category(name: str) -> str | None:
