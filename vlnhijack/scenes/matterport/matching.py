@@ -16,6 +16,7 @@ _SPACING = 0.1  # metres between the points that stand for a large face
 _MOST_SPLITS = 64
 _TURN = 0.02  # metres that a face turned round counts as further away, halved
 _NEIGHBOURS = 8
+_DIGITS = 5  # of metres: what lies nearer together is equally far
 _CHUNK = 1 << 15
 
 
@@ -38,8 +39,8 @@ def match_objects(
     """The object (F,) of each of `faces` (F,3,3), -1 for none, from `segmented` (G,3,3) with (G,).
 
     It is that of the nearest segmented face among the eight whose points are nearest to the face's
-    centroid; faces that look the other way count as 4 cm further away. advance is told of every
-    run of faces.
+    centroid; faces that look the other way count as 4 cm further away, and of equally near ones
+    it is the one with the nearest point. advance is told of every run of faces.
     """
     points, owner = _points(segmented)
     tree = cKDTree(points)
@@ -59,11 +60,11 @@ def match_objects(
 
 
 def _points(corners: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Points (P,3) on faces (G,3,3), no further apart than _SPACING, and their face (P,)."""
+    """Points (P,3) on faces (G,3,3), _SPACING apart and at their centroids, and their face (P,)."""
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
     splits = np.clip(np.ceil(longest / _SPACING), 1, _MOST_SPLITS).astype(np.int64)
-    points, owner = [], []
-    for count in np.unique(splits):
+    points, owner = [corners.mean(1)], [np.arange(len(corners))]
+    for count in np.unique(splits[splits > 1]):
         members = np.flatnonzero(splits == count)
         i, j = np.indices((count, count))
         inside = i + j < count
@@ -81,7 +82,7 @@ def _nearest(segmented: Floats, near: NDArray[np.int64], faces: Floats) -> tuple
     distance = np.linalg.norm(closest - centres, axis=1).reshape(near.shape)
     distance = np.nan_to_num(distance, nan=np.inf)
     cosine = np.einsum("fkd,fd->fk", _normals(candidates).reshape(*near.shape, 3), _normals(faces))
-    best = np.argmin(distance + _TURN * (1 - cosine), 1)
+    best = np.argmin(np.round(distance + _TURN * (1 - cosine), _DIGITS), 1)
     rows = np.arange(len(near))
     return distance[rows, best], near[rows, best]
 
