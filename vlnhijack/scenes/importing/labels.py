@@ -88,7 +88,7 @@ def label_by_file(read: MeshFile, file: Path) -> Labelled:
 
 
 def _named(node: Sequence[str]) -> tuple[str, str] | None:
-    """The node or ancestor that is an object, and its category; the whole where parts say it too."""
+    """The node or ancestor that is an object (the whole, not its parts), and its category."""
     categories = [_category(name) for name in node]
     found = next((row for row, category in enumerate(categories) if category is not None), None)
     if found is None:

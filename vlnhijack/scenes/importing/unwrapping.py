@@ -31,14 +31,17 @@ def unwrapped(house: House, object_ids: Iterable[str]) -> House:
     return replace(house, surfaces=kept + made, objects=objects)
 
 
-def unwrap_object(object_id: str, parts: Sequence[Surface]) -> Surface:
+def unwrap_object(
+    object_id: str, parts: Sequence[Surface], resolution: int | None = None
+) -> Surface:
     """One surface of all parts: a UV atlas of the object, and its texels as the parts look there.
 
-    The texture is square and as fine as the parts' own, so that views stay the same (PSNR ≥ 35 dB).
+    The texture has resolution² texels, by default as fine as the parts' own, so that views stay the
+    same (PSNR ≥ 35 dB).
     Charts do not cross from part to part, since colours end there. Deterministic.
     """
     vertices, faces = _joined(parts)
-    atlas = _unwrap_apart(parts, faces, _resolution(parts))
+    atlas = _unwrap_apart(parts, faces, resolution or _resolution(parts))
     texels = rasterise(atlas.uv, atlas.faces, atlas.height, atlas.width)
     texture = np.zeros((atlas.height, atlas.width, 3), np.float32)
     used = np.zeros(texture.shape[:2], bool)
