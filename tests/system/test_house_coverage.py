@@ -1,7 +1,6 @@
 """The coverage kept with a house: exact counts, equal to the operator's row sums, never stale."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,10 @@ from tests.fuzz import refused_or_read, texts
 from tests.houses import tiny_house
 from vlnhijack.errors import InputError
 from vlnhijack.experiments import house_coverage
+from vlnhijack.experiments.config import DatasetInstances
 from vlnhijack.experiments.house_coverage import FILE, load_coverage, measure_coverage
+from vlnhijack.experiments.instances.datasets import load_scans
+from vlnhijack.navigation.episode import Episode, save_episodes
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.coverage import object_index_map
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
@@ -24,11 +26,11 @@ WIDTH, HEIGHT = 64, 48
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(house_coverage, "WIDTH", WIDTH)
     monkeypatch.setattr(house_coverage, "HEIGHT", HEIGHT)
-    save_house(tiny_house(), tmp_path / "house")
-    return tmp_path / "house"
+    save_house(tiny_house(), tmp_path / "tiny_baked")
+    return tmp_path / "tiny_baked"
 
 
 def test_counts_are_the_row_sums_of_the_operator(folder: Path) -> None:
@@ -50,6 +52,22 @@ def test_counts_are_the_row_sums_of_the_operator(folder: Path) -> None:
             np.testing.assert_allclose(rows, kept.pixels[row, :, column], atol=1e-2)
             centres = (index == column).sum((1, 2))
             assert np.abs(centres - rows).max() < 0.02 * WIDTH * HEIGHT
+
+
+def test_attack_instances_take_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vlnhijack.experiments.views.coverage_table", None)
+    measured = measure_coverage(folder, lambda views: None)
+    house = load_house(folder)
+    path = house.graph.viewpoints[:2]
+    episode = Episode(1, house.name, path, 0.0, "go", "1_0", 2.0)
+    save_episodes(folder / "episodes" / "val_seen.json", [episode])
+    wanted = DatasetInstances.model_validate({"dataset": "houses", "visibility": "masks"})
+    (scan,) = load_scans(folder.parent, wanted)
+    found = {(place.viewpoint, place.object_id): place.coverage for place in scan.places}
+    for row, viewpoint in enumerate(house.graph.viewpoints):
+        for column, thing in enumerate(house.objects):
+            share = measured.pixels[row, :, column].max() / (WIDTH * HEIGHT)
+            assert found[viewpoint, thing.id] == pytest.approx(share, abs=1e-6)
 
 
 def test_a_house_without_it_has_none(folder: Path) -> None:

@@ -79,11 +79,14 @@ def info(
     house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
 ) -> None:
     """What a house holds, what its viewpoints show, and warnings."""
+    from vlnhijack.experiments.house_coverage import load_coverage
     from vlnhijack.experiments.house_info import describe
     from vlnhijack.scenes.house_files import load_house
     from vlnhijack.settings import house_folder
 
-    found = describe(load_house(house_folder(house)))
+    folder = house_folder(house)
+    loaded = load_house(folder)
+    found = describe(loaded, load_coverage(folder, loaded))
     counts = Table("", "count")
     for name, count in found.counts.items():
         counts.add_row(name, str(count))

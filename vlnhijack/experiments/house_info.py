@@ -7,6 +7,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
+from vlnhijack.experiments.house_coverage import HouseCoverage
 from vlnhijack.experiments.views import coverage_table, house_cameras
 from vlnhijack.rendering.coverage import depth_map
 from vlnhijack.scenes.house import House
@@ -52,9 +53,11 @@ class HouseInfo:
         return dict(sorted(found.items()))
 
 
-def describe(house: House) -> HouseInfo:
-    """Look at a house from all of its viewpoints."""
-    if house.objects:
+def describe(house: House, kept: HouseCoverage | None = None) -> HouseInfo:
+    """Look at a house from all of its viewpoints; kept: the coverage that lies with it."""
+    if kept is not None:
+        coverage = kept.shares.max(axis=1)
+    elif house.objects:
         coverage = coverage_table(house, WIDTH, HEIGHT).max(axis=1)
     else:
         coverage = np.zeros((len(house.graph.viewpoints), 0), np.float32)

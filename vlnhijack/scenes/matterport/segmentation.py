@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from vlnhijack.artifacts import read_json, validated
 from vlnhijack.errors import InputError
+from vlnhijack.scenes.importing.memory import BYTES_PER_BYTE, require_memory
 from vlnhijack.scenes.ply import columns, read_elements, triangles
 
 LEAST_AGREEMENT = 0.9
@@ -55,10 +56,13 @@ class Segmentation:
 def read_segmentation(folder: Path, scan: str, objects: int) -> Segmentation:
     """Read the three files of a scan whose `.house` file lists so many objects.
 
-    Raises InputError where a file is missing or broken, the numbers of faces or the ids of objects
-    do not match, a segment is in two groups, or less than 90 % of the faces agree.
+    Raises InputError where a file is missing, broken or larger than the memory, the numbers of
+    faces or the ids of objects do not match, a segment is in two groups, or less than 90 % of the
+    faces agree.
     """
     mesh = folder / f"{scan}.ply"
+    if mesh.is_file():
+        require_memory(mesh, BYTES_PER_BYTE * mesh.stat().st_size)
     elements = read_elements(mesh)
     faces = triangles(mesh, elements)
     face_object = columns(mesh, elements, "face", ["segment_id"], np.int32)[:, 0]
