@@ -133,6 +133,15 @@ def plain_look(images: Images, material: Any) -> Look:
     return Look(Material("texture", images.pixels(image, "of the mesh")))
 
 
+def without_image(look: Look, images: Images) -> Look:
+    """The look on a mesh without texture coordinates: the mean colour of its image."""
+    material = look.material
+    if material.image is None:
+        return look
+    images.notes.append(f"{material.name} lacks texture coordinates: its mean colour instead")
+    return Look(Material(material.name, colour=_triple(material.image.mean((0, 1)) / 255)))
+
+
 def each_once(make: Callable[[Any], Look]) -> Callable[[Any], Look]:
     """`make`, called once for each material by name."""
     made: dict[str | None, Look] = {}
@@ -146,6 +155,6 @@ def each_once(make: Callable[[Any], Look]) -> Callable[[Any], Look]:
     return look
 
 
-def _triple(values: NDArray[np.float32]) -> tuple[float, float, float]:
+def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
     red, green, blue = map(float, values)
     return red, green, blue

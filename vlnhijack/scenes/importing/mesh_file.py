@@ -24,6 +24,7 @@ from vlnhijack.scenes.importing.looks import (
     gltf_look,
     obj_look,
     plain_look,
+    without_image,
 )
 from vlnhijack.scenes.importing.memory import BYTES_PER_BYTE, require_memory
 from vlnhijack.scenes.importing.mtl import MtlMaterial, material_libraries, read_mtl
@@ -89,7 +90,7 @@ def read_mesh(file: Path, options: ReadOptions = ReadOptions()) -> MeshFile:
     require_memory(file, BYTES_PER_BYTE * file.stat().st_size)
     images = Images(file, options.allow_missing)
     scene, look = _READERS[kind](file, images)
-    pieces = list(_pieces(file, scene, each_once(look), linear=kind in (".glb", ".gltf")))
+    pieces = list(_pieces(images, scene, each_once(look), linear=kind in (".glb", ".gltf")))
     if not pieces:
         raise InputError(file=file, field="faces", expected="≥ 1 face", received=0)
     return _joined(file, pieces, images, options.up or _UP[kind], options.scale)
@@ -167,7 +168,7 @@ def _ply_counts(file: Path) -> dict[str, int]:
 
 
 def _pieces(
-    file: Path, scene: trimesh.Scene, look: Callable[[Any], Look], *, linear: bool
+    images: Images, scene: trimesh.Scene, look: Callable[[Any], Look], *, linear: bool
 ) -> Iterator[_Piece]:
     """The pieces of all nodes; linear: colours of vertices are linear and not display values."""
     for name in scene.graph.nodes_geometry:
@@ -182,21 +183,26 @@ def _pieces(
             visual = geometry.visual
         material = getattr(visual, "material", None)
         seen = Look(PLAIN) if material is None else look(material)
+        if getattr(visual, "uv", None) is None:
+            seen = without_image(seen, images)
         faces = np.asarray(geometry.faces, np.int64)
-        vertices = _moved(file, geometry, faces, np.asarray(matrix, float))
-        uv = _corner_uv(file, geometry, faces, seen)
+        vertices = _moved(images.file, geometry, faces, np.asarray(matrix, float))
+        uv = _corner_uv(images.file, visual, faces, len(vertices), seen)
         if np.linalg.det(matrix[:3, :3]) < 0:
             faces, uv = faces[:, ::-1], uv[:, ::-1]
         colours = _colours(visual, linear=linear)
-        node = _lineage(file, scene, name, material)
+        node = _lineage(images.file, scene, name, material)
         yield _Piece(node, vertices, faces, uv, colours, seen.material)
 
 
 def _moved(
     file: Path, geometry: trimesh.Trimesh, faces: NDArray[np.int64], matrix: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Vertices in the scene's axes; InputError where a face has a vertex that is not there."""
+    """Vertices in the scene's axes; InputError where they or the faces are not whole."""
     vertices = np.asarray(geometry.vertices, float)
+    for field, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise InputError(file=file, field=field, expected="(N, 3)", received=array.shape)
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(
             file=file,
@@ -209,18 +215,18 @@ def _moved(
 
 
 def _corner_uv(
-    file: Path, geometry: trimesh.Trimesh, faces: NDArray[np.int64], look: Look
+    file: Path, visual: Any, faces: NDArray[np.int64], count: int, look: Look
 ) -> NDArray[np.float32]:
-    """(F,3,2), v down; zeros where the geometry has none, or its material no image."""
-    uv = getattr(geometry.visual, "uv", None)
+    """(F,3,2), v down, of a mesh of `count` vertices; zeros where the material has no image."""
     if look.material.image is None:
         return np.zeros((len(faces), 3, 2), np.float32)
-    if uv is None or len(uv) != len(geometry.vertices):
+    uv = np.asarray(visual.uv)
+    if uv.ndim != 2 or len(uv) != count:
         raise InputError(
             file=file,
             field=f"texture coordinates of {look.material.name}",
-            expected=f"{len(geometry.vertices)}, one for each vertex, since it has a texture",
-            received="none" if uv is None else len(uv),
+            expected=f"{count}, one for each vertex",
+            received=uv.shape,
         )
     offset, scale = look.transform
     down = np.asarray(uv, float)[:, :2] * [1, -1] + [0, 1]

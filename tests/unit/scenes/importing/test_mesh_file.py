@@ -1,5 +1,6 @@
 """Mesh files of every kind become our world; broken ones are refused in one line."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,16 @@ def test_glb_materials(tmp_path) -> None:
     wanted = display.decode(picture("seat", 20, 32) / 255) * [0.5, 1, 1]
     assert np.abs(seat.image / 255 - display.encode(wanted)).max() < 0.003
     assert any("alpha" in note for note in read.notes)
+
+
+def test_a_texture_without_coordinates_is_its_mean(tmp_path) -> None:
+    path = written(tmp_path, "obj")
+    path.write_text(re.sub(r"/\d+", "", path.read_text()))
+    read = read_mesh(path)
+    looks = {m.name: m for m in read.mesh.materials}
+    assert looks["a"].image is None
+    assert np.allclose(looks["a"].colour, picture("a", 16, 24).mean((0, 1)) / 255)
+    assert any("texture coordinates" in note for note in read.notes)
 
 
 def test_gltf_beside_its_files(tmp_path) -> None:
