@@ -1,13 +1,19 @@
-"""`vlnhijack house`: make houses, render them."""
+"""`vlnhijack house`: make houses, import them, look at them."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
+from vlnhijack.cli import house_import, house_scan
 from vlnhijack.cli.console import console, progress_bars
 
-app = typer.Typer(no_args_is_help=True, help="Make houses, render them.")
+app = typer.Typer(no_args_is_help=True, help="Make houses, import them, look at them.")
+app.add_typer(house_import.app, name="import")
+app.command()(house_scan.export)
+app.command()(house_scan.panoramas)
+app.command()(house_scan.coverage)
 
 
 @app.command()
@@ -62,3 +68,65 @@ def render(
     with progress_bars() as progress:
         render_house(load_house(house_folder(house)), wanted, out, progress)
     console.print(f"{len(wanted.views)} views and panorama.png: {out}")
+
+
+@app.command()
+def unwrap(
+    house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
+    objects: Annotated[list[str] | None, typer.Argument(help="Ids; all by default.")] = None,
+) -> None:
+    """Give objects of an imported house textures of their own, so that they can be attacked."""
+    from vlnhijack.experiments.import_house import unwrap_folder
+    from vlnhijack.settings import house_folder
+
+    unwrap_folder(house_folder(house), objects or [])
+
+
+@app.command()
+def reduce(
+    house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
+    budget: Annotated[str, typer.Option(help="auto, FACES or FACESxTEXELS, as 50000x512.")],
+    max_error: Annotated[float, typer.Option(help="RMSE that --budget auto keeps to.")] = 0.02,
+    out: Annotated[Path | None, typer.Option(help="Folder; the house's own by default.")] = None,
+) -> None:
+    """Reduce faces and texels, and say what that costs in image error and gains."""
+    from vlnhijack.experiments.reduce_house import parse_budget, reduce_folder
+    from vlnhijack.settings import house_folder
+
+    wanted, folder = parse_budget(budget), house_folder(house)
+    with progress_bars() as progress:
+        rows = reduce_folder(folder, out or folder, wanted, max_error, progress)
+    table = Table(title=f"{house}, the original first")
+    for column in ("faces", "texels", "MB", "seconds", "RMSE"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        numbers = (f"{row.megabytes:.1f}", f"{row.seconds:.2f}", f"{row.rmse:.4f}")
+        table.add_row(str(row.faces), str(row.texels), *numbers)
+    console.print(table)
+
+
+@app.command()
+def info(
+    house: Annotated[str, typer.Argument(help="A house of scenes/, or a folder.")],
+) -> None:
+    """What a house holds, what its viewpoints show, and warnings."""
+    from vlnhijack.experiments.house_coverage import load_coverage
+    from vlnhijack.experiments.house_info import describe
+    from vlnhijack.scenes.house_files import load_house
+    from vlnhijack.settings import house_folder
+
+    folder = house_folder(house)
+    loaded = load_house(folder)
+    found = describe(loaded, load_coverage(folder, loaded))
+    counts = Table("", "count")
+    for name, count in found.counts.items():
+        counts.add_row(name, str(count))
+    console.print(counts)
+    table = Table("category", "objects", "largest share of a view", "viewpoints ≥ 40 %")
+    for category, rows in found.by_category.items():
+        shares = found.coverage[:, rows]
+        close = int((shares >= 0.4).any(axis=1).sum())
+        table.add_row(category, str(len(rows)), f"{shares.max():.0%}", str(close))
+    console.print(table)
+    for warning in found.warnings:
+        console.print(f"warning: {warning}")

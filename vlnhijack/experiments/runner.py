@@ -3,7 +3,7 @@
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from vlnhijack.experiments.instances.houses import draw, pick
 from vlnhijack.experiments.overfitting import overfitting
 from vlnhijack.experiments.pictures import illustrate
 from vlnhijack.experiments.yaml_config import load_config, save_config
+from vlnhijack.scenes.importing.unwrapping import unwrapped
 from vlnhijack.threat import AttackInstance
 
 _PACKAGES = ("vlnhijack", "torch", "mitsuba", "drjit", "numpy", "xatlas", "trimesh")
@@ -46,6 +47,7 @@ def run(
     make_repeatable(config.threads)
     context = load_context(config, folder, progress)
     instances = make_instances(context)
+    context = with_attackable(context, instances)
     open_folder(config, folder, resume=resume)
     write_json(folder / "instances.json", [asdict(instance) for instance in instances])
     attacks = make_attacks(config, folder, instances)
@@ -130,6 +132,15 @@ def make_instances(context: Context) -> list[AttackInstance]:
         return load_instances(Path(wanted.file))
     scans = list(context.scans.values())
     return draw(scans, wanted.kind, wanted.count, rules, seed)
+
+
+def with_attackable(context: Context, instances: Sequence[AttackInstance]) -> Context:
+    """The context whose houses have a texture for each attacked object (see `unwrapping`)."""
+    houses = {
+        name: unwrapped(house, [each.object_id for each in instances if each.scan == name])
+        for name, house in context.houses.items()
+    }
+    return context if houses == context.houses else replace(context, houses=houses)
 
 
 def used_scans(instances: Sequence[AttackInstance]) -> list[str]:

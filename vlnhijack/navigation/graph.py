@@ -4,7 +4,7 @@ import lzma
 import tarfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from vlnhijack.artifacts import parse_json, read_json, validated, write_json
 from vlnhijack.errors import InputError
 
+UPRIGHT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
 _SUFFIX = "_connectivity.json"
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -39,7 +40,9 @@ class NavigationGraph:
     """Viewpoints and the edges between them.
 
     viewpoints: N ids; positions (N,3) float64 metres, the camera's centre at eye height;
-    adjacency (N,N) bool, symmetric; heights (N,) metres of the camera above the floor.
+    adjacency (N,N) bool, symmetric; heights (N,) metres of the camera above the floor; rotations
+    (N,3,3) from the axes of the skybox images to the world, by default UPRIGHT: the image in front
+    looks along +y (see `scenes.matterport.skybox`).
     """
 
     scan: str
@@ -47,6 +50,11 @@ class NavigationGraph:
     positions: NDArray[np.float64]
     adjacency: NDArray[np.bool_]
     heights: NDArray[np.float64]
+    rotations: NDArray[np.float64] = field(default_factory=lambda: UPRIGHT[None])
+
+    def __post_init__(self) -> None:
+        shape = (len(self.viewpoints), 3, 3)
+        object.__setattr__(self, "rotations", np.broadcast_to(self.rotations, shape))
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -158,6 +166,14 @@ class GraphFolder(Mapping[str, NavigationGraph]):
         return _graph(scan, parse_json(self._texts[name], path), path)
 
 
+def scan_graph(source: Path, scan: str) -> NavigationGraph:
+    """The graph of a scan in a folder or archive; InputError where it has none."""
+    graphs = GraphFolder(source)
+    if scan not in graphs:
+        raise InputError(file=source, expected=f"{scan}{_SUFFIX}", received="no such file")
+    return graphs[scan]
+
+
 def _archived(source: Path) -> dict[str, bytes]:
     """The connectivity files of an archive by name, unparsed."""
     try:
@@ -192,7 +208,8 @@ def _graph(scan: str, content: Any, path: Path) -> NavigationGraph:
     poses = np.array([records[row].pose for row in kept], float).reshape(-1, 4, 4)
     edges = np.array([np.array(records[row].unobstructed)[kept] for row in kept])
     heights = np.array([records[row].height for row in kept], float)
-    return NavigationGraph(scan, names, poses[:, :3, 3], edges | edges.T, heights)
+    positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
+    return NavigationGraph(scan, names, positions, edges | edges.T, heights, rotations)
 
 
 def save_graph(graph: NavigationGraph, folder: Path) -> None:
@@ -200,7 +217,7 @@ def save_graph(graph: NavigationGraph, folder: Path) -> None:
     records: list[dict[str, Any]] = []
     for row, name in enumerate(graph.viewpoints):
         pose = np.eye(4)
-        pose[:3, 3] = graph.positions[row]
+        pose[:3, :3], pose[:3, 3] = graph.rotations[row], graph.positions[row]
         records.append(
             {
                 "image_id": name,

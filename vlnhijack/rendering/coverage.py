@@ -34,6 +34,13 @@ def object_coverage(
     return _for_views(house, cameras, spp, seed, share).astype(np.float32)
 
 
+def object_pixels(house: House, cameras: Sequence[Camera]) -> NDArray[np.int32]:
+    """Pixels (V, objects) whose one ray, `object_coverage`'s with spp 1, meets each object."""
+    width, height = image_size(cameras)
+    share = object_coverage(house, cameras, spp=1).astype(np.float64)
+    return np.round(share * (width * height)).astype(np.int32)
+
+
 def object_index_map(house: House, cameras: Sequence[Camera]) -> NDArray[np.int16]:
     """Index (V,h,w) into `house.objects` of what each pixel's centre shows, -1 for the rest."""
 

@@ -5,10 +5,10 @@ from typing import Any, Literal, get_args
 
 from vlnhijack.errors import InputError
 from vlnhijack.rendering.variant import activate
+from vlnhijack.scenes.surface import Wrap
 
 Film = Literal["box", "gaussian"]
 Lookup = Literal["bilinear", "nearest"]
-Wrap = Literal["clamp", "repeat", "mirror"]
 
 
 @dataclass(frozen=True)

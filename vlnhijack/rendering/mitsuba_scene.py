@@ -12,7 +12,7 @@ from vlnhijack import display
 from vlnhijack.rendering.filters import Filters
 from vlnhijack.rendering.variant import activate
 from vlnhijack.scenes.house import House, Light
-from vlnhijack.scenes.surface import Surface
+from vlnhijack.scenes.surface import Surface, Wrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,13 @@ def build_scene(house: House, filters: Filters = Filters()) -> MitsubaScene:
     """
     mi = activate()
     content: dict[str, Any] = {"type": "scene"}
+    bitmaps: dict[tuple[int, Wrap], Any] = {}
     for index, surface in enumerate(house.surfaces):
-        content[f"surface_{index}"] = _mesh(f"surface_{index}", surface, house.kind, filters)
+        look = id(surface.texture), surface.wrap
+        if look not in bitmaps:
+            bitmaps[look] = mi.load_dict(_bitmap(surface, house.kind, filters))
+        name = f"surface_{index}"
+        content[name] = _mesh(name, surface, house.kind, bitmaps[look])
     for index, light in enumerate(house.lights if house.kind == "lit" else ()):
         content[f"light_{index}"] = mi.load_dict(_light(light))
     scene = mi.load_dict(content, parallel=False)
@@ -85,15 +90,16 @@ def set_textures(built: MitsubaScene, textures: Sequence[NDArray[np.float32]]) -
     params.update()
 
 
-def bitmap(texture: NDArray[np.float32], filters: Filters) -> dict[str, Any]:
-    """A differentiable float texture."""
+def _bitmap(surface: Surface, kind: str, filters: Filters) -> dict[str, Any]:
+    """A differentiable float texture: radiance, or linear albedo."""
+    texture = surface.texture if kind == "baked" else display.decode(surface.texture)
     return {
         "type": "bitmap",
         "data": _bitmap_data(texture),
         "format": "variant",
         "raw": True,
         "filter_type": filters.lookup,
-        "wrap_mode": filters.wrap,
+        "wrap_mode": filters.wrap if surface.wrap == "clamp" else surface.wrap,
     }
 
 
@@ -108,18 +114,16 @@ def _bitmap_data(texture: NDArray[np.float32]) -> Any:
     return activate().TensorXf(np.ascontiguousarray(whole, np.float32))
 
 
-def _mesh(name: str, surface: Surface, kind: str, filters: Filters) -> Any:
+def _mesh(name: str, surface: Surface, kind: str, bitmap: Any) -> Any:
     mi = activate()
     props = mi.Properties()
     if kind == "baked":
-        glow = bitmap(surface.texture, filters)
-        props["emitter"] = mi.load_dict({"type": "area", "radiance": glow})
+        props["emitter"] = mi.load_dict({"type": "area", "radiance": bitmap})
         props["bsdf"] = mi.load_dict(
             {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0}}
         )
     else:
-        albedo = bitmap(display.decode(surface.texture), filters)
-        props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": albedo})
+        props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": bitmap})
     mesh = mi.Mesh(
         name, len(surface.vertices), len(surface.faces), has_vertex_texcoords=True, props=props
     )

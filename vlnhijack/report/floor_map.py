@@ -74,8 +74,8 @@ def _draw_furniture(axes: Axes, house: House, highlighted: str) -> None:
     """Silhouettes, the low ones first, so that a table covers its rug."""
     by_height = sorted(house.objects, key=lambda item: item.centre[2] + item.size[2] / 2)
     for rank, item in enumerate(by_height):
-        surface = house.surface(item.id)
-        faces = surface.vertices[surface.faces][:, :, :2]
+        parts = house.parts(item.id)
+        faces = np.concatenate([part.vertices[part.faces][:, :, :2] for part in parts])
         order = 2 + rank / len(by_height)
         if item.id == highlighted:
             fill, line, width, order = HIGHLIGHT, INK, 2.6, 3.2

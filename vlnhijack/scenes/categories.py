@@ -5,7 +5,22 @@ from pathlib import Path
 from vlnhijack.artifacts import open_text
 from vlnhijack.errors import InputError
 
+MPCAT40 = (
+    *("void", "wall", "floor", "chair", "door", "table", "picture", "cabinet", "cushion"),
+    *("window", "sofa", "bed", "curtain", "chest_of_drawers", "plant", "sink", "stairs"),
+    *("ceiling", "toilet", "stool", "towel", "mirror", "tv_monitor", "shower", "column"),
+    *("bathtub", "counter", "fireplace", "lighting", "beam", "railing", "shelving", "blinds"),
+    *("gym_equipment", "seating", "board_panel", "furniture", "appliances", "clothes"),
+    *("objects", "misc", "unlabeled"),
+)
+STRUCTURE = ("void", "wall", "floor", "stairs", "ceiling", "column", "beam", "unlabeled")
+
 _FROM, _TO = "raw_category", "mpcat40"
+
+
+def mpcat40_id(category: str) -> int:
+    """The index of an mpcat40 category, -1 for another."""
+    return MPCAT40.index(category) if category in MPCAT40 else -1
 
 
 def read_categories(file: Path) -> dict[str, str]:

@@ -12,34 +12,44 @@ from vlnhijack import display
 from vlnhijack.artifacts import write_bytes
 from vlnhijack.frames import z_up_to_y_up
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.surface import Surface
+from vlnhijack.scenes.surface import Surface, Wrap
 
+WRAP_CODES: dict[Wrap, int] = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
 _UNLIT = "KHR_materials_unlit"
 
 
 def save_glb(house: House, path: Path) -> None:
-    """Write one node per surface, named by it; y up, metres.
+    """Write one node per surface, named by it; y up, metres. A shared texture is one material.
 
     Textures are JPEG to keep the file small; the exact texels are the PNG files of the house.
     Baked houses carry their light, so their materials are unlit.
     """
     scene = trimesh.Scene()
+    materials: dict[tuple[int, Wrap], PBRMaterial] = {}
     for surface in house.surfaces:
-        scene.add_geometry(_mesh(surface), node_name=surface.name, geom_name=surface.name)
-    unlit = _make_unlit if house.kind == "baked" else None
+        look = id(surface.texture), surface.wrap
+        if look not in materials:
+            materials[look] = _material(surface)
+        mesh = _mesh(surface, materials[look])
+        scene.add_geometry(mesh, node_name=surface.name, geom_name=surface.name)
+    wraps = {surface.name: surface.wrap for surface in house.surfaces}
+    complete = partial(_complete, wraps=wraps, unlit=house.kind == "baked")
     write_bytes(
         path,
-        trimesh.exchange.gltf.export_glb(scene, include_normals=False, tree_postprocessor=unlit),
+        trimesh.exchange.gltf.export_glb(scene, include_normals=False, tree_postprocessor=complete),
     )
 
 
-def _mesh(surface: Surface) -> trimesh.Trimesh:
-    material = PBRMaterial(
+def _material(surface: Surface) -> PBRMaterial:
+    return PBRMaterial(
         name=surface.name,
         baseColorTexture=_jpeg(surface),
         metallicFactor=0.0,
         roughnessFactor=1.0,
     )
+
+
+def _mesh(surface: Surface, material: PBRMaterial) -> trimesh.Trimesh:
     visual = trimesh.visual.TextureVisuals(surface.uv * [1, -1] + [0, 1], material=material)
     vertices = z_up_to_y_up(surface.vertices)
     return trimesh.Trimesh(vertices, surface.faces, visual=visual, process=False)
@@ -53,7 +63,13 @@ def _jpeg(surface: Surface) -> Image.Image:
     return image
 
 
-def _make_unlit(tree: dict[str, Any]) -> None:
-    tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), _UNLIT]
+def _complete(tree: dict[str, Any], wraps: dict[str, Wrap], *, unlit: bool) -> None:
+    """Add what trimesh does not write: wrap modes, and that materials are unlit."""
+    tree["samplers"] = [{"wrapS": code, "wrapT": code} for code in WRAP_CODES.values()]
     for material in tree["materials"]:
-        material["extensions"] = {_UNLIT: {}}
+        texture = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+        tree["textures"][texture]["sampler"] = list(WRAP_CODES).index(wraps[material["name"]])
+    if unlit:
+        tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), _UNLIT]
+        for material in tree["materials"]:
+            material["extensions"] = {_UNLIT: {}}

@@ -14,13 +14,17 @@ from vlnhijack.scenes.surface import Surface
 
 @dataclass(frozen=True)
 class HouseObject:
-    """An attackable piece of furniture: one surface whose `object_id` is this id."""
+    """A piece of furniture: the surfaces whose `object_id` is this id.
+
+    unwrapped: it has a single surface, with a texture of its own, and so can be attacked.
+    """
 
     id: str
     category: str
     room: str
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
+    unwrapped: bool = True
 
 
 @dataclass(frozen=True)
@@ -64,17 +68,32 @@ class House:
     exposure: float = 1.0
 
     @cached_property
-    def _by_id(self) -> dict[str, tuple[HouseObject, Surface]]:
-        surfaces = {s.object_id: s for s in self.surfaces if s.object_id is not None}
+    def _by_id(self) -> dict[str, tuple[HouseObject, tuple[Surface, ...]]]:
+        surfaces: dict[str, tuple[Surface, ...]] = {}
+        for surface in self.surfaces:
+            if surface.object_id is not None:
+                surfaces[surface.object_id] = (*surfaces.get(surface.object_id, ()), surface)
         return {o.id: (o, surfaces[o.id]) for o in self.objects}
 
     def object(self, object_id: str) -> HouseObject:
         """The object of that id; InputError where the house has none."""
         return self._lookup(object_id)[0]
 
-    def surface(self, object_id: str) -> Surface:
-        """The surface of an object; InputError where the house has no such object."""
+    def parts(self, object_id: str) -> tuple[Surface, ...]:
+        """All surfaces of an object; InputError where the house has no such object."""
         return self._lookup(object_id)[1]
+
+    def surface(self, object_id: str) -> Surface:
+        """The surface of an object; InputError where there is none, or it is not unwrapped."""
+        thing, parts = self._lookup(object_id)
+        if not thing.unwrapped:
+            raise InputError(
+                file=self.name,
+                field=f"object {object_id}",
+                expected="an unwrapped one (vlnhijack house unwrap)",
+                received="one that shares its textures",
+            )
+        return parts[0]
 
     def with_texture(self, object_id: str, texture: NDArray[np.float32]) -> "House":
         """The house with another texture (H,W,3) on one object."""
@@ -82,7 +101,7 @@ class House:
         surfaces = tuple(changed if s.object_id == object_id else s for s in self.surfaces)
         return replace(self, surfaces=surfaces)
 
-    def _lookup(self, object_id: str) -> tuple[HouseObject, Surface]:
+    def _lookup(self, object_id: str) -> tuple[HouseObject, tuple[Surface, ...]]:
         if object_id not in self._by_id:
             raise InputError(
                 file=self.name,

@@ -33,9 +33,9 @@ from vlnhijack.errors import InputError
 from vlnhijack.navigation.graph import load_graph, save_graph
 from vlnhijack.scenes.gltf import save_glb
 from vlnhijack.scenes.house import House, HouseObject, Light, Room
-from vlnhijack.scenes.mitsuba_xml import mesh_path, scene_xml, texture_path
+from vlnhijack.scenes.mitsuba_xml import mesh_path, scene_xml, texture_paths
 from vlnhijack.scenes.ply import read_ply, write_ply
-from vlnhijack.scenes.surface import Surface
+from vlnhijack.scenes.surface import Surface, Wrap
 
 T = TypeVar("T")
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -48,6 +48,7 @@ class _SurfaceEntry(BaseModel):
     mesh: str
     texture: str
     object: str | None
+    wrap: Wrap = "clamp"
 
 
 class _HouseFile(BaseModel):
@@ -87,11 +88,13 @@ def save_house(
     _check(house, folder)
     with atomic_folder(folder) as new:
         hashes: dict[str, str] = {}
+        textures = texture_paths(house)
         for surface in house.surfaces:
-            mesh, texture = mesh_path(surface), texture_path(surface)
+            mesh, texture = mesh_path(surface), textures[surface.name]
             write_ply(new / mesh, surface.vertices, surface.faces, surface.uv)
-            write_texture(new / texture, surface.texture)
-            hashes |= {path: sha256(new / path) for path in (mesh, texture)}
+            if texture not in hashes:
+                write_texture(new / texture, surface.texture)
+            hashes |= {path: sha256(new / path) for path in (mesh, texture) if path not in hashes}
         write_json(new / "house.json", _entry(house, hashes).model_dump())
         write_json(new / "objects.json", _OBJECTS.dump_python(house.objects))
         save_graph(house.graph, new)
@@ -110,10 +113,13 @@ def load_house(folder: Path) -> House:
     inconsistent, or lies outside the folder.
     """
     entry = _read(_HOUSE, folder / "house.json")
+    textures = _load_textures(folder, entry)
     house = House(
         name=entry.name,
         kind=entry.kind,
-        surfaces=tuple(_load_surface(folder, surface, entry.sha256) for surface in entry.surfaces),
+        surfaces=tuple(
+            _load_surface(folder, surface, entry.sha256, textures) for surface in entry.surfaces
+        ),
         objects=_read(_OBJECTS, folder / "objects.json"),
         rooms=entry.rooms,
         graph=load_graph(folder, entry.name),
@@ -143,8 +149,15 @@ def read_texture(path: Path) -> NDArray[np.float32]:
 
 
 def _entry(house: House, hashes: dict[str, str]) -> _HouseFile:
+    textures = texture_paths(house)
     surfaces = tuple(
-        _SurfaceEntry(name=s.name, mesh=mesh_path(s), texture=texture_path(s), object=s.object_id)
+        _SurfaceEntry(
+            name=s.name,
+            mesh=mesh_path(s),
+            texture=textures[s.name],
+            object=s.object_id,
+            wrap=s.wrap,
+        )
         for s in house.surfaces
     )
     return _HouseFile(
@@ -163,11 +176,20 @@ def _read(form: TypeAdapter[T], path: Path) -> T:
     return validated(form, read_json(path), path)
 
 
-def _load_surface(folder: Path, entry: _SurfaceEntry, hashes: dict[str, str]) -> Surface:
-    mesh = _verified(folder, entry.mesh, hashes)
-    texture = _verified(folder, entry.texture, hashes)
-    vertices, faces, uv = read_ply(mesh)
-    return Surface(entry.name, vertices, faces, uv, read_texture(texture), entry.object)
+def _load_textures(folder: Path, entry: _HouseFile) -> dict[str, NDArray[np.float32]]:
+    """Each texture once, by its path in the folder."""
+    paths = dict.fromkeys(surface.texture for surface in entry.surfaces)
+    return {path: read_texture(_verified(folder, path, entry.sha256)) for path in paths}
+
+
+def _load_surface(
+    folder: Path,
+    entry: _SurfaceEntry,
+    hashes: dict[str, str],
+    textures: dict[str, NDArray[np.float32]],
+) -> Surface:
+    mesh = read_ply(_verified(folder, entry.mesh, hashes))
+    return Surface(entry.name, *mesh, textures[entry.texture], entry.object, entry.wrap)
 
 
 def _verified(folder: Path, relative: str, hashes: dict[str, str]) -> Path:
@@ -195,7 +217,9 @@ def _verified(folder: Path, relative: str, hashes: dict[str, str]) -> Path:
 def _check(house: House, folder: Path) -> None:
     names = [surface.name for surface in house.surfaces]
     owners = sorted(s.object_id for s in house.surfaces if s.object_id is not None)
-    objects = sorted(o.id for o in house.objects)
+    shared = {o.id for o in house.objects if not o.unwrapped}
+    owners = sorted({*owners} & shared) + [name for name in owners if name not in shared]
+    objects = sorted(shared) + sorted(o.id for o in house.objects if o.unwrapped)
     rooms = {room.id for room in house.rooms}
     strangers = sorted({o.room for o in house.objects} - rooms)
     for name in (house.name, *names):

@@ -27,9 +27,16 @@ def mesh_path(surface: Surface) -> str:
     return f"meshes/{surface.name}.ply"
 
 
-def texture_path(surface: Surface) -> str:
-    """Path of a surface's texture inside the house folder."""
-    return f"textures/{surface.name}.png"
+def texture_paths(house: House) -> dict[str, str]:
+    """Path inside the house folder of the texture of each surface, by the surface's name.
+
+    Surfaces that share a texture (the same array) share the file named by the first of them.
+    """
+    owner: dict[int, str] = {}
+    return {
+        surface.name: f"textures/{owner.setdefault(id(surface.texture), surface.name)}.png"
+        for surface in house.surfaces
+    }
 
 
 def scene_xml(house: House) -> str:
@@ -38,8 +45,9 @@ def scene_xml(house: House) -> str:
     integrator = ElementTree.SubElement(scene, "integrator", type="path")
     _value(integrator, "integer", "max_depth", _MAX_DEPTH[house.kind])
     scene.append(_sensor(default_camera(house)))
+    textures = texture_paths(house)
     for surface in house.surfaces:
-        scene.append(_shape(surface, house.kind == "baked"))
+        scene.append(_shape(surface, textures[surface.name], house.kind == "baked"))
     for number, light in enumerate(house.lights):
         scene.append(_light(light, f"light_{number}"))
     ElementTree.indent(scene)
@@ -91,7 +99,7 @@ def _sensor(camera: frames.Camera) -> Element:
     return sensor
 
 
-def _shape(surface: Surface, emits: bool) -> Element:
+def _shape(surface: Surface, file: str, emits: bool) -> Element:
     shape = Element("shape", type="ply", id=surface.name)
     _value(shape, "string", "filename", mesh_path(surface))
     _value(shape, "boolean", "face_normals", "true")
@@ -99,18 +107,18 @@ def _shape(surface: Surface, emits: bool) -> Element:
     if emits:
         _value(bsdf, "rgb", "reflectance", 0)
         emitter = ElementTree.SubElement(shape, "emitter", type="area")
-        emitter.append(_texture(surface, "radiance", raw=True))
+        emitter.append(_texture(surface, file, "radiance", raw=True))
     else:
-        bsdf.append(_texture(surface, "reflectance", raw=False))
+        bsdf.append(_texture(surface, file, "reflectance", raw=False))
     return shape
 
 
-def _texture(surface: Surface, name: str, *, raw: bool) -> Element:
+def _texture(surface: Surface, file: str, name: str, *, raw: bool) -> Element:
     texture = Element("texture", type="bitmap", name=name)
-    _value(texture, "string", "filename", texture_path(surface))
+    _value(texture, "string", "filename", file)
     _value(texture, "boolean", "raw", str(raw).lower())
     _value(texture, "string", "filter_type", "bilinear")
-    _value(texture, "string", "wrap_mode", "clamp")
+    _value(texture, "string", "wrap_mode", surface.wrap)
     _value(texture, "string", "format", "variant")
     return texture
 

@@ -4,9 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from tests.fuzz import refused_or_read
 from vlnhijack.errors import InputError
-from vlnhijack.scenes.ply import read_ply, write_ply
+from vlnhijack.scenes.ply import (
+    columns,
+    read_elements,
+    read_ply,
+    triangles,
+    write_elements,
+    write_ply,
+)
 
 MESH = (
     np.random.default_rng(0).random((4, 3), np.float32),
@@ -60,3 +70,30 @@ def test_polygons_that_are_no_triangles(tmp_path: Path) -> None:
 def test_missing(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="No such file"):
         read_ply(tmp_path / "mesh.ply")
+
+
+def test_further_columns(tmp_path: Path) -> None:
+    path = tmp_path / "mesh.ply"
+    vertex = {"x": MESH[0][:, 0], "red": np.arange(4, dtype=np.uint8)}
+    write_elements(path, vertex, MESH[1], {"segment_id": np.array([-1, 7], np.int32)})
+    content = path.read_bytes().replace(b"element vertex", b"comment by hand\nelement vertex", 1)
+    path.write_bytes(content)
+    elements = read_elements(path)
+    assert columns(path, elements, "face", ["segment_id"], np.int32).ravel().tolist() == [-1, 7]
+    assert columns(path, elements, "vertex", ["red"], np.int32).ravel().tolist() == [0, 1, 2, 3]
+    assert np.array_equal(triangles(path, elements), MESH[1])
+    with pytest.raises(InputError, match="header: expected a property y of each vertex"):
+        columns(path, elements, "vertex", "xyz", np.float64)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("ply") / "mesh.ply"
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=12), st.integers(0, 400), st.booleans())
+def test_no_mesh_ends_in_a_traceback(file: Path, junk: bytes, at: int, cut: bool) -> None:
+    write_ply(file, *MESH)
+    whole = file.read_bytes()
+    refused_or_read(file, whole[:at] + junk + (b"" if cut else whole[at + len(junk) :]), read_ply)

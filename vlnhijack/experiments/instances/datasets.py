@@ -21,7 +21,7 @@ _EPISODES = {
 }
 _GRAPHS = ("connectivity", "connectivity.tar.gz", "../R2R/connectivity")
 _BOXES = ("BBox", "reverie_boxes_v1.json")
-_MASK_SIZE = (160, 120)  # pixels, of 4 rays each
+_MASK_SIZE = (160, 120)  # pixels, of 4 rays each, where no coverage is kept with the house
 _CATEGORIES = ("category_mapping.tsv", "matterport_category_mappings.tsv")
 
 
@@ -100,6 +100,7 @@ def _box_places(
 
 def _mask_places(houses: Mapping[str, Path]) -> dict[str, list[Place]]:
     """What is seen in the houses of these folders."""
+    from vlnhijack.experiments.house_coverage import load_coverage
     from vlnhijack.experiments.views import coverage_table
 
     if not houses:
@@ -107,7 +108,9 @@ def _mask_places(houses: Mapping[str, Path]) -> dict[str, list[Place]]:
     places = {}
     for scan, folder in houses.items():
         house = load_house(folder)
-        places[scan] = rendered_places(house, coverage_table(house, *_MASK_SIZE))
+        kept = load_coverage(folder, house)
+        shares = kept.shares if kept else coverage_table(house, *_MASK_SIZE)
+        places[scan] = rendered_places(house, shares)
     return places
 
 

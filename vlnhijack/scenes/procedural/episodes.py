@@ -32,10 +32,12 @@ def make_episodes(
     Paths are shortest paths of four to seven viewpoints and at least 5 m that end near a landmark.
     A path of which a val_seen path is a part is not used at all; so val_seen paths are drawn with
     chances that fall with the root of the number of paths they are part of. A small graph gives
-    fewer paths, in proportion.
+    fewer paths, in proportion, or none.
     """
     landmarks = find_landmarks(house)
     paths = [p for p in _shortest_paths(house.graph) if stop_facts(landmarks, p)]
+    if not paths:
+        return [], []
     rng = seeds.stream(seed, "episodes", house.name)
     val_paths = min(val_paths, len(paths) * val_paths // (train_paths + val_paths))
     whole = Counter(part for path in paths for part in _parts(path))

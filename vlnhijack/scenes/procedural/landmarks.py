@@ -10,6 +10,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from vlnhijack import seeds
 from vlnhijack.frames import heading_of
 from vlnhijack.scenes.house import House, Room
+from vlnhijack.scenes.surface import Surface
 
 POINTS = 24
 RECOGNISED = 0.4  # an object is a landmark where this share of its surface points is seen
@@ -60,7 +61,10 @@ class Landmarks:
 
 def find_landmarks(house: House) -> Landmarks:
     """Look around from every viewpoint of a house, by ray casts to points of every object."""
-    footprints = {o.id: _footprint(house.surface(o.id).vertices) for o in house.objects}
+    footprints = {
+        o.id: _footprint(np.concatenate([part.vertices for part in house.parts(o.id)]))
+        for o in house.objects
+    }
     shares = _visible_shares(house)
     sightings = {
         viewpoint: _sightings(house, footprints, row, shares[row])
@@ -110,21 +114,26 @@ def _sightings(
 
 def _visible_shares(house: House) -> NDArray[np.float64]:
     """Share (viewpoints, objects) of each object's surface points whose ray first hits it."""
-    meshes = [trimesh.Trimesh(s.vertices, s.faces, process=False) for s in house.surfaces]
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
+    meshes = [_mesh(surface) for surface in house.surfaces]
+    targets = {thing.id: row for row, thing in enumerate(house.objects)}
+    owners = [targets.get(surface.object_id or "", -1) for surface in house.surfaces]
+    owner = np.repeat(owners, [len(mesh.faces) for mesh in meshes])
     scene = RayMeshIntersector(trimesh.util.concatenate(meshes))
-    rows = {s.object_id: row for row, s in enumerate(house.surfaces)}
-    targets = np.array([rows[thing.id] for thing in house.objects])
-    points = np.stack([_points(meshes[row], house.surfaces[row].name) for row in targets])
+    points = np.stack([_points(house, object_id) for object_id in targets])
     shares = np.empty((len(house.graph.viewpoints), len(targets)))
     for row, position in enumerate(house.graph.positions):
         directions = (points - position).reshape(-1, 3)
         hits = scene.intersects_first(np.broadcast_to(position, directions.shape), directions)
-        seen = (owner[hits] == np.repeat(targets, POINTS)) & (hits >= 0)
+        seen = (owner[hits] == np.repeat(np.arange(len(targets)), POINTS)) & (hits >= 0)
         shares[row] = seen.reshape(-1, POINTS).mean(axis=1)
     return shares
 
 
-def _points(mesh: trimesh.Trimesh, name: str) -> NDArray[np.float64]:
-    seed = seeds.integer(0, "landmarks", name)
+def _mesh(surface: Surface) -> trimesh.Trimesh:
+    return trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+
+
+def _points(house: House, object_id: str) -> NDArray[np.float64]:
+    mesh = trimesh.util.concatenate([_mesh(part) for part in house.parts(object_id)])
+    seed = seeds.integer(0, "landmarks", object_id)
     return np.asarray(trimesh.sample.sample_surface(mesh, POINTS, seed=seed)[0], float)

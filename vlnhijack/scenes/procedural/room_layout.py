@@ -13,7 +13,8 @@ from vlnhijack.scenes.house import Room
 from vlnhijack.scenes.procedural.floor_plan import FloorPlan
 from vlnhijack.scenes.procedural.furniture import make_piece
 from vlnhijack.scenes.procedural.furniture.piece import Piece
-from vlnhijack.scenes.procedural.viewpoints import CLEARANCE, distance_to_boxes, walkable
+from vlnhijack.scenes.procedural.viewpoints import distance_to_boxes, walkable
+from vlnhijack.scenes.walking import CLEARANCE
 
 FLAT = 0.15
 OVERHEAD = 1.9

@@ -1,7 +1,7 @@
 import numpy as np
 import trimesh
 
-from vlnhijack.scenes.procedural.lookouts import lookouts
+from vlnhijack.scenes.lookouts import lookouts
 
 
 def _board(height: float) -> trimesh.Trimesh:

@@ -1,0 +1,1 @@
+"""Houses from meshes that others made: readers, reduction and assembly."""

@@ -1,0 +1,36 @@
+"""What the letters of regions mean (Matterport3D, data_organization.md)."""
+
+LABELS = {
+    "a": "bathroom",
+    "b": "bedroom",
+    "c": "closet",
+    "d": "dining room",
+    "e": "entryway",
+    "f": "family room",
+    "g": "garage",
+    "h": "hallway",
+    "i": "library",
+    "j": "laundry room",
+    "k": "kitchen",
+    "l": "living room",
+    "m": "meeting room",
+    "n": "lounge",
+    "o": "office",
+    "p": "porch",
+    "r": "rec room",
+    "s": "stairs",
+    "t": "toilet",
+    "u": "utility room",
+    "v": "tv room",
+    "w": "gym",
+    "x": "outdoors",
+    "y": "balcony",
+    "z": "other room",
+    "B": "bar",
+    "C": "classroom",
+    "D": "dining booth",
+    "S": "spa",
+    "Z": "junk",
+}
+CODES = {label: code for code, label in LABELS.items()}
+UNKNOWN = "-"
