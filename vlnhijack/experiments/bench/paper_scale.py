@@ -16,7 +16,6 @@ from vlnhijack.agents.hamt import Hamt
 from vlnhijack.agents.hamt_config import HamtConfig
 from vlnhijack.agents.observation import ObservationTable, observation_table
 from vlnhijack.agents.reader import Reader
-from vlnhijack.agents.trajectory import Instructions
 from vlnhijack.agents.vit import VisionTransformer, VitConfig
 from vlnhijack.attack.attacked_views import AttackedViews
 from vlnhijack.attack.objective import Objective, attack_objective
@@ -80,7 +79,7 @@ class Scale:
 
 @dataclass(frozen=True, eq=False)
 class PaperScale:
-    """All of an attack but the agent. tokens (batch,T), mask (batch,T): the instructions."""
+    """All of an attack but the agent."""
 
     preset: Preset
     house: House
@@ -89,8 +88,6 @@ class PaperScale:
     renderer: Renderer
     viewpoints: Tensor
     views: Tensor
-    tokens: Tensor
-    mask: Tensor
     seed: int
 
     def agent(self) -> Agent:
@@ -102,7 +99,11 @@ class PaperScale:
         for model in (encoder, policy):
             model.eval().requires_grad_(False)
         return Agent(
-            encoder, policy, Reader(None, self.preset.policy.vocab_size), {}, Path("random")
+            encoder,
+            policy,
+            Reader(None, self.preset.policy.vocab_size, self.preset.longest),
+            {},
+            Path("random"),
         )
 
     def problem(self, agent: Agent) -> tuple[AttackedViews, Objective]:
@@ -111,10 +112,7 @@ class PaperScale:
         size = (len(self.table.index), VIEWS, agent.encoder.feature_size)
         clean = torch.randn(size, generator=generator)
         views = AttackedViews(self.renderer, agent.encoder, clean, self.viewpoints, self.views)
-        objective = attack_objective(agent, self.table, self.instance, self.instance.train, views)
-        with torch.no_grad():
-            text = agent.policy.encode_text(self.tokens, self.mask)
-        return views, replace(objective, instructions=Instructions(text, self.mask))
+        return views, attack_objective(agent, self.table, self.instance, self.instance.train, views)
 
     def texture(self) -> ProjectedAdam:
         surface = self.house.surface(self.instance.object_id)
@@ -137,7 +135,7 @@ def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale())
     passing = _through(house, path[0])
     order = seeds.stream(seed, "paper-scale episodes").permutation(len(passing))[: scale.batch]
     category = next(item.category for item in house.objects if item.id == object_id)
-    episodes = tuple(passing[index] for index in order)
+    episodes = _instruct([passing[index] for index in order], preset, seed)
     instance = AttackInstance(
         "bench", house.name, object_id, category, path[0], 0.0, tuple(path[1:]), episodes, (), ()
     )
@@ -148,7 +146,6 @@ def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale())
         for row, view in zip(rows.tolist(), views.tolist(), strict=True)
     ]
     renderer = FrozenRenderer(house, object_id, cameras, scale.spp, seed)
-    tokens, mask = _instructions(preset, len(episodes), seed)
     return PaperScale(
         preset=preset,
         house=house,
@@ -157,8 +154,6 @@ def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale())
         renderer=renderer,
         viewpoints=rows,
         views=views,
-        tokens=tokens,
-        mask=mask,
         seed=seed,
     )
 
@@ -194,11 +189,13 @@ def _paths(house: House, scale: Scale) -> Iterator[list[str]]:
             yield from (path for path in paths if len(path) == scale.steps)
 
 
-def _instructions(preset: Preset, count: int, seed: int) -> tuple[Tensor, Tensor]:
-    """Token ids and mask (count,T) of random texts."""
+def _instruct(episodes: Sequence[Episode], preset: Preset, seed: int) -> tuple[Episode, ...]:
+    """The episodes with random token ids."""
     rng = seeds.stream(seed, "paper-scale instructions")
-    drawn = rng.normal(preset.mean, preset.deviation, count).round()
-    lengths = torch.from_numpy(drawn).long().clamp(3, preset.longest)
-    mask = torch.arange(int(lengths.max())) < lengths[:, None]
-    words = torch.from_numpy(rng.integers(1, preset.policy.vocab_size, tuple(mask.shape)))
-    return words * mask, mask
+    drawn = rng.normal(preset.mean, preset.deviation, len(episodes)).round()
+    lengths = drawn.astype(int).clip(3, preset.longest)
+    words = (rng.integers(1, preset.policy.vocab_size, length) for length in lengths)
+    return tuple(
+        replace(episode, encoding=tuple(ids.tolist()))
+        for episode, ids in zip(episodes, words, strict=True)
+    )
