@@ -42,9 +42,11 @@ def make_walking_graph(source: SourceMesh, name: str, seed: int) -> NavigationGr
         trimesh.Trimesh(source.vertices, source.faces[source.face_object == row], process=False)
         for row in range(len(source.objects))
     ]
-    graph = walking_graph(
-        name, seed, space, landmarks, MOST_VIEWPOINTS, lambda places: len(places) > 1
-    )
+    graph = None
+    if len(space.places):
+        graph = walking_graph(
+            name, seed, space, landmarks, MOST_VIEWPOINTS, lambda places: len(places) > 1
+        )
     if graph is None:
         raise InputError(
             file=source.file,
@@ -84,7 +86,7 @@ def free_space(mesh: trimesh.Trimesh, file: str) -> FreeSpace:
         return np.where(inside, distance[rows, columns], 0.0)
 
     places = centres[_largest(distance >= CLEARANCE).ravel()]
-    thin = -(-len(places) // MOST_PLACES)
+    thin = max(1, -(-len(places) // MOST_PLACES))
     return FreeSpace(places[::thin], 0, clearance, mesh, floor)
 
 
