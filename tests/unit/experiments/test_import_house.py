@@ -6,8 +6,9 @@ import pytest
 from rich.progress import Progress
 from typer.testing import CliRunner
 
-from tests.mesh_files import write_glb
+from tests.mesh_files import write_glb, write_ply
 from vlnhijack.cli import app
+from vlnhijack.experiments.house_info import describe
 from vlnhijack.experiments.import_house import ImportOptions, import_mesh, unwrap_folder
 from vlnhijack.scenes.house_files import load_house
 
@@ -25,6 +26,17 @@ def test_import_then_unwrap(tmp_path) -> None:
     assert [(o.id, o.unwrapped) for o in house.objects] == [("chair_00", False)]
     unwrap_folder(folder, [])
     assert load_house(folder).surface("chair_00").wrap == "clamp"
+
+
+def test_a_coloured_mesh_without_objects(tmp_path) -> None:
+    write_ply(tmp_path / "mesh.ply", size=(4, 6, 2.5))
+    folder = tmp_path / "plain"
+    with Progress(disable=True) as progress:
+        lines = import_mesh(tmp_path / "mesh.ply", "plain", folder, ImportOptions(), progress)
+    assert "objects: none" in lines
+    house = load_house(folder)
+    assert house.surfaces[0].texture.std() > 0.1
+    assert describe(house).warnings == (), "the box was turned inside out"
 
 
 @pytest.mark.parametrize(
