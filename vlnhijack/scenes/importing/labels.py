@@ -47,8 +47,8 @@ def label_by_name(read: MeshFile, rooms: tuple[Room, ...] = ()) -> Labelled:
     """Objects are the nodes whose names hold a word for one, such as Office_Chair.003.
 
     A node belongs to the nearest of itself and its ancestors with such a word, and on to a parent
-    with a word for the same thing; to the background if there is none.
-    An object is in the room nearest to its centre; without rooms, the mesh is one.
+    with a word for the same thing; to the background if there is none. An object is in the room
+    nearest to its centre; without rooms, the mesh is one.
     """
     rooms = rooms or _whole(read.mesh)
     named = [_named(node) for node in read.nodes]

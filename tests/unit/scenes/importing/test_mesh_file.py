@@ -145,7 +145,7 @@ LABELS = {
 
 
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(content=texts(LABELS))
 def test_broken_labels_are_refused_in_one_line(tmp_path, content: bytes) -> None:
@@ -155,7 +155,7 @@ def test_broken_labels_are_refused_in_one_line(tmp_path, content: bytes) -> None
 
 @pytest.mark.parametrize("kind", ["glb", "obj", "ply"])
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_broken_files_are_refused_in_one_line(tmp_path, kind: str, data) -> None:
