@@ -51,9 +51,10 @@ def write_obj(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def write_ply(path: Path) -> None:
-    """A coloured box of 2×3×2 m."""
-    box = trimesh.creation.box((2, 3, 2))
+def write_ply(path: Path, size: tuple[float, float, float] = (2, 3, 2)) -> None:
+    """A coloured box that stands on z = 0."""
+    box = trimesh.creation.box(size)
+    box.apply_translation((0, 0, size[2] / 2))
     box.visual.vertex_colors = np.arange(32).reshape(8, 4) * 8
     path.write_bytes(box.export(file_type="ply"))
 

@@ -35,7 +35,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_counts_are_the_row_sums_of_the_operator(folder: Path) -> None:
     views: list[int] = []
-    measured = measure_coverage(folder, views.append)
+    measured = measure_coverage(folder, load_house(folder), views.append)
     house = load_house(folder)
     kept = load_coverage(folder, house)
     assert kept is not None
@@ -56,7 +56,7 @@ def test_counts_are_the_row_sums_of_the_operator(folder: Path) -> None:
 
 def test_attack_instances_take_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vlnhijack.experiments.views.coverage_table", None)
-    measured = measure_coverage(folder, lambda views: None)
+    measured = measure_coverage(folder, load_house(folder), lambda views: None)
     house = load_house(folder)
     path = house.graph.viewpoints[:2]
     episode = Episode(1, house.name, path, 0.0, "go", "1_0", 2.0)
@@ -75,7 +75,7 @@ def test_a_house_without_it_has_none(folder: Path) -> None:
 
 
 def test_a_changed_house_makes_it_stale(folder: Path) -> None:
-    measure_coverage(folder, lambda views: None)
+    measure_coverage(folder, load_house(folder), lambda views: None)
     objects = json.loads((folder / "objects.json").read_text())
     (folder / "objects.json").write_text(json.dumps(objects[::-1]))
     with pytest.raises(InputError, match="stale, measure it again"):
@@ -83,7 +83,7 @@ def test_a_changed_house_makes_it_stale(folder: Path) -> None:
 
 
 def test_saving_the_house_anew_drops_it(folder: Path) -> None:
-    measure_coverage(folder, lambda views: None)
+    measure_coverage(folder, load_house(folder), lambda views: None)
     save_house(load_house(folder), folder)
     assert not (folder / FILE).exists()
 
@@ -95,7 +95,7 @@ def test_saving_the_house_anew_drops_it(folder: Path) -> None:
 def test_no_file_ends_in_a_traceback(folder: Path, data: st.DataObject) -> None:
     house = load_house(folder)
     if not (folder / "valid.json").exists():
-        measure_coverage(folder, lambda views: None)
+        measure_coverage(folder, load_house(folder), lambda views: None)
         (folder / FILE).rename(folder / "valid.json")
     content = data.draw(texts(json.loads((folder / "valid.json").read_text())))
     refused_or_read(folder / FILE, content, lambda path: load_coverage(folder, house))

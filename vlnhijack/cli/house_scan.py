@@ -79,11 +79,15 @@ def coverage(
 ) -> None:
     """Count the pixels of each view that objects fill; kept with the house as coverage.json."""
     from vlnhijack.experiments.house_coverage import FILE, measure_coverage
+    from vlnhijack.navigation.views import VIEWS
+    from vlnhijack.scenes.house_files import load_house
     from vlnhijack.settings import house_folder
 
     folder = house_folder(house)
+    loaded = load_house(folder)
     with progress_bars() as progress:
-        task = progress.add_task(f"{folder.name}: views", total=None)
-        found = measure_coverage(folder, lambda views: progress.advance(task, views))
+        total = VIEWS * len(loaded.graph.viewpoints)
+        task = progress.add_task(f"{loaded.name}: views", total=total)
+        found = measure_coverage(folder, loaded, lambda views: progress.advance(task, views))
     seen = found.pixels.any((0, 1)).sum()
     console.print(f"{folder / FILE}: {seen} of {found.pixels.shape[2]} objects are seen")

@@ -14,7 +14,6 @@ from vlnhijack.experiments.views import Advance
 from vlnhijack.navigation.views import VIEWS, panorama_cameras
 from vlnhijack.rendering.coverage import object_pixels
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import load_house
 
 FILE = "coverage.json"
 WIDTH, HEIGHT = 640, 480
@@ -52,13 +51,12 @@ class _File(BaseModel):
 _FILE = TypeAdapter(_File)
 
 
-def measure_coverage(folder: Path, advance: Advance) -> HouseCoverage:
-    """Count the pixels of all 36·M views of 640 × 480 and write `coverage.json` into the house.
+def measure_coverage(folder: Path, house: House, advance: Advance) -> HouseCoverage:
+    """Count the pixels of all 36·M views of 640 × 480 and write `coverage.json` into the folder.
 
     One ray a pixel: those of `FrozenRenderer(house, object, panorama_cameras(…), spp=1)`, the sums
     of whose rows are these counts. advance is told of the views that are done.
     """
-    house = load_house(folder)
     pixels = np.zeros((len(house.graph.viewpoints), VIEWS, len(house.objects)), np.int32)
     for row, (x, y, z) in enumerate(house.graph.positions.tolist()):
         pixels[row] = object_pixels(house, panorama_cameras((x, y, z), WIDTH, HEIGHT))
@@ -75,7 +73,7 @@ def measure_coverage(folder: Path, advance: Advance) -> HouseCoverage:
 
 
 def load_coverage(folder: Path, house: House) -> HouseCoverage | None:
-    """What `measure_coverage` wrote into the house, or None.
+    """What `measure_coverage` wrote into the folder, or None.
 
     Raises InputError where the file is broken or was measured before the house was changed.
     """

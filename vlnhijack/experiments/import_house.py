@@ -43,7 +43,7 @@ def import_mesh(
     """Write the house of a mesh file to `folder`, as a whole or not at all; lines about it."""
     check_name(name, folder)
     started = time.perf_counter()
-    stages = Stages(progress, name)
+    stages = Stages(progress, name, total=7 if options.unwrap_all else 6)
     stages.next("read")
     read = read_mesh(file, options.read)
     if options.labels is None:
@@ -63,7 +63,7 @@ def import_mesh(
 class Stages:
     """One progress bar for the stages of an import."""
 
-    def __init__(self, progress: Progress, name: str, total: int = 6) -> None:
+    def __init__(self, progress: Progress, name: str, total: int) -> None:
         self._progress, self._name = progress, name
         self._task = progress.add_task(name, total=total)
         self._done = 0

@@ -11,6 +11,7 @@ episodes/*.json             R2R-form episodes, one file per split
 
 import re
 import shutil
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -220,6 +221,12 @@ def _check(house: House, folder: Path) -> None:
     shared = {o.id for o in house.objects if not o.unwrapped}
     owners = sorted({*owners} & shared) + [name for name in owners if name not in shared]
     objects = sorted(shared) + sorted(o.id for o in house.objects if o.unwrapped)
+    own = Counter(id(surface.texture) for surface in house.surfaces)
+    leaking = [
+        s.name
+        for s in house.surfaces
+        if s.object_id in set(objects) - shared and (own[id(s.texture)] > 1 or s.wrap != "clamp")
+    ]
     rooms = {room.id for room in house.rooms}
     strangers = sorted({o.room for o in house.objects} - rooms)
     for name in (house.name, *names):
@@ -228,6 +235,7 @@ def _check(house: House, folder: Path) -> None:
         (not names, "surfaces", "≥ 1 surface", 0),
         (len(set(names)) < len(names), "surfaces", "distinct names", _repeated(names)),
         (owners != objects, "objects", f"one surface for each of {objects}", owners),
+        (leaking, "textures", "one of its own, clamped, for each unwrapped object", leaking),
         (strangers, "objects", f"rooms among {sorted(rooms)}", strangers),
         (house.graph.scan != house.name, "graph", house.name, house.graph.scan),
     ):

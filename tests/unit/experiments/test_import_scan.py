@@ -4,6 +4,7 @@ import json
 import shutil
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fuzz import broken
+from tests.houses import tiny_house
 from tests.scans import import_quietly, pack, tiny_scan
 from vlnhijack.errors import InputError
 from vlnhijack.scenes.house_files import load_house
+from vlnhijack.scenes.matterport.export import export_scan
 from vlnhijack.scenes.ply import read_elements, write_elements
 
 NAME = "tiny_baked"
@@ -46,6 +49,25 @@ def test_packed_and_plain_scans_are_the_same(scan: Path, tmp_path: Path) -> None
     assert plain[:-1] == packed[:-1]
     for file in ("house.json", "objects.json", f"{NAME}_connectivity.json"):
         assert (tmp_path / "plain" / file).read_bytes() == (tmp_path / "packed" / file).read_bytes()
+
+
+def test_graphs_of_several_houses_lie_together(tmp_path: Path) -> None:
+    for name in ("second", "first"):
+        house = replace(tiny_house(), name=name)
+        graph = replace(house.graph, scan=name)
+        export_scan(replace(house, graph=graph), tmp_path, [])
+    assert (tmp_path / "connectivity" / "scans.txt").read_text() == "first\nsecond\n"
+
+
+@pytest.mark.parametrize("wrong", ["lit", "mirror"])
+def test_what_the_layout_cannot_hold_is_not_exported(tmp_path: Path, wrong: str) -> None:
+    house = tiny_house("lit" if wrong == "lit" else "baked")
+    if wrong == "mirror":
+        surfaces = tuple(replace(surface, wrap="mirror") for surface in house.surfaces)
+        house = replace(house, surfaces=surfaces)
+    with pytest.raises(InputError, match=wrong):
+        export_scan(house, tmp_path / "out", [])
+    assert not (tmp_path / "out").exists()
 
 
 def test_walls_and_floors_are_background(scan: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 from tests.fuzz import refused_or_read, texts
 from tests.grids import grid_graph
 from vlnhijack.errors import InputError
-from vlnhijack.navigation.graph import GraphFolder, load_graph, save_graph
+from vlnhijack.navigation.graph import UPRIGHT, GraphFolder, load_graph, save_graph
 
 GRAPH = grid_graph("east")
 
@@ -57,6 +58,15 @@ def test_a_folder_and_an_archive_hold_the_same_graphs(
     assert np.array_equal(graphs["east"].adjacency, GRAPH.adjacency)
     with pytest.raises(KeyError):
         graphs["north"]
+
+
+def test_rotations_are_kept_and_upright_by_default(tmp_path: Path) -> None:
+    turned = GRAPH.rotations.copy()
+    turned[1] = turned[1] @ [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    save_graph(replace(GRAPH, rotations=turned), tmp_path)
+    read = load_graph(tmp_path, "east")
+    assert np.array_equal(read.rotations, turned)
+    assert np.array_equal(read.rotations[0], UPRIGHT)
 
 
 def test_a_graph_is_read_when_it_is_asked_for(tmp_path: Path) -> None:

@@ -42,9 +42,11 @@ def make_walking_graph(source: SourceMesh, name: str, seed: int) -> NavigationGr
         trimesh.Trimesh(source.vertices, source.faces[source.face_object == row], process=False)
         for row in range(len(source.objects))
     ]
-    graph = walking_graph(
-        name, seed, space, landmarks, MOST_VIEWPOINTS, lambda places: len(places) > 1
-    )
+    graph = None
+    if len(space.places):
+        graph = walking_graph(
+            name, seed, space, landmarks, MOST_VIEWPOINTS, lambda places: len(places) > 1
+        )
     if graph is None:
         raise InputError(
             file=source.file,
@@ -68,14 +70,13 @@ def free_space(mesh: trimesh.Trimesh, file: str) -> FreeSpace:
         )
     centres = low + CELL * np.moveaxis(np.indices(tuple(shape)), 0, -1).reshape(-1, 2)
     scene = RayMeshIntersector(mesh)
-    candidates = [
-        (floor, _walkable(scene, centres, floor).reshape(shape)) for floor in _levels(mesh)
-    ]
+    candidates = [_walkable(scene, centres, level) for level in _levels(mesh)]
     most = max(int(free.sum()) for _, free in candidates)
     floor, free = min(
         (found for found in candidates if found[1].sum() >= _ENOUGH * most), key=lambda c: c[0]
     )
-    distance = CELL * np.asarray(distance_transform_edt(np.pad(free, 1)))[1:-1, 1:-1]
+    around = np.pad(free.reshape(shape), 1)
+    distance = CELL * np.asarray(distance_transform_edt(around))[1:-1, 1:-1]
 
     def clearance(points: Array) -> Array:
         cells = np.round((points - low) / CELL).astype(int)
@@ -84,14 +85,13 @@ def free_space(mesh: trimesh.Trimesh, file: str) -> FreeSpace:
         return np.where(inside, distance[rows, columns], 0.0)
 
     places = centres[_largest(distance >= CLEARANCE).ravel()]
-    thin = -(-len(places) // MOST_PLACES)
+    thin = max(1, -(-len(places) // MOST_PLACES))
     return FreeSpace(places[::thin], 0, clearance, mesh, floor)
 
 
-def _levels(mesh: trimesh.Trimesh, count: int = 3) -> Sequence[float]:
-    """Heights of the levels with the most area that faces up, or down where none faces up."""
-    steepness = mesh.face_normals[:, 2]
-    flat = steepness > _FLAT if (steepness > _FLAT).any() else steepness < -_FLAT
+def _levels(mesh: trimesh.Trimesh, count: int = 4) -> Sequence[float]:
+    """Heights of the levels with the most level area, whichever side it shows."""
+    flat = np.abs(mesh.face_normals[:, 2]) > _FLAT
     heights, areas = mesh.triangles_center[flat, 2], mesh.area_faces[flat]
     if len(heights) == 0:
         return [float(mesh.bounds[0, 2])]
@@ -101,16 +101,20 @@ def _levels(mesh: trimesh.Trimesh, count: int = 3) -> Sequence[float]:
     return [float(np.average(heights[bins == b], weights=areas[bins == b])) for b in best]
 
 
-def _walkable(scene: RayMeshIntersector, centres: Array, floor: float) -> NDArray[np.bool_]:
-    """Cells (K,) whose floor is bare up to a person's height and that no wall passes through."""
-    top = np.column_stack([centres, np.full(len(centres), floor + HEADROOM)])
-    ground = _reach(scene, top, np.array([0.0, 0.0, -1.0]))
-    free = np.abs(ground - HEADROOM) <= STEP_UP
+def _walkable(scene: RayMeshIntersector, centres: Array, level: float) -> tuple[float, Cells]:
+    """Height of the floor near a level, and the cells (K,) where one can stand on it.
+
+    There the floor is bare up to a person's height, and no wall passes through.
+    """
+    top = np.column_stack([centres, np.full(len(centres), level + HEADROOM)])
+    ground = level + HEADROOM - _reach(scene, top, np.array([0.0, 0.0, -1.0]))
+    free = np.abs(ground - level) <= STEP_UP
+    floor = float(np.median(ground[free])) if free.any() else level
     for height, (x, y) in product(_BODY, ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))):
         rows = np.flatnonzero(free)
         origins = np.column_stack([centres[rows], np.full(len(rows), floor + height)])
         free[rows] = _reach(scene, origins, np.array([x, y, 0.0])) > CELL
-    return free
+    return floor, free
 
 
 def _reach(scene: RayMeshIntersector, origins: Array, direction: Array) -> Array:

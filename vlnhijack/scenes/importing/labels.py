@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -36,40 +36,43 @@ class _Object(BaseModel):
 
 class _Labels(BaseModel):
     model_config = _STRICT
-    objects: tuple[_Object, ...]
+    objects: tuple[_Object, ...] | None = None
     rooms: tuple[Room, ...] = ()
 
 
 _LABELS = TypeAdapter(_Labels)
 
 
-def label_by_name(read: MeshFile) -> Labelled:
+def label_by_name(read: MeshFile, rooms: tuple[Room, ...] = ()) -> Labelled:
     """Objects are the nodes whose names hold a word for one, such as Office_Chair.003.
 
     A node belongs to the nearest of itself and its ancestors with such a word, and on to a parent
-    with a word for the same thing; to the background if there is none.
-    The one room of the house is the extent of the mesh.
+    with a word for the same thing; to the background if there is none. An object is in the room
+    nearest to its centre; without rooms, the mesh is one.
     """
+    rooms = rooms or _whole(read.mesh)
     named = [_named(node) for node in read.nodes]
     owners = list(dict.fromkeys(owner for owner in named if owner is not None))
-    numbers: Counter[str] = Counter()
-    objects = []
-    rooms = _whole(read.mesh)
-    for _, category in owners:
-        objects.append(SourceObject(f"{category}_{numbers[category]:02d}", category, rooms[0].id))
-        numbers[category] += 1
     rank = [BACKGROUND if owner is None else owners.index(owner) for owner in named]
     face_object = np.array(rank, np.int32)[read.face_node]
+    numbers: Counter[str] = Counter()
+    objects = []
+    for row, (_, category) in enumerate(owners):
+        room = _nearest_room(read.mesh, face_object == row, rooms)
+        objects.append(SourceObject(f"{category}_{numbers[category]:02d}", category, room))
+        numbers[category] += 1
     return replace(read.mesh, face_object=face_object, objects=tuple(objects)), rooms
 
 
 def label_by_file(read: MeshFile, file: Path) -> Labelled:
-    """Objects, and rooms if there are some, of a JSON file; docs/import.md has its form.
+    """Objects and rooms of a JSON file, whose form docs/import.md tells; either may be left out.
 
     Raises InputError that names the object where its node, faces or room do not exist, or faces
     have two owners.
     """
     labels = validated(_LABELS, read_json(file), file)
+    if labels.objects is None:
+        return label_by_name(read, labels.rooms)
     rooms = labels.rooms or _whole(read.mesh)
     face_object = np.full(len(read.mesh.faces), BACKGROUND, np.int32)
     for number, entry in enumerate(labels.objects):
@@ -149,9 +152,14 @@ def _room(
         if entry.room not in {room.id for room in rooms}:
             _refuse(file, entry, "room", f"one of {[room.id for room in rooms]}", entry.room)
         return entry.room
-    corners = mesh.vertices[mesh.faces[mine]].reshape(-1, 3)
-    if len(corners) == 0:
+    if not mine.any():
         _refuse(file, entry, "faces", "≥ 1 face", 0)
+    return _nearest_room(mesh, mine, rooms)
+
+
+def _nearest_room(mesh: SourceMesh, mine: NDArray[np.bool_], rooms: Sequence[Room]) -> str:
+    """The room nearest to the centre of these faces' box."""
+    corners = mesh.vertices[mesh.faces[mine]].reshape(-1, 3)
     x, y = (corners.min(axis=0)[:2] + corners.max(axis=0)[:2]) / 2
     return min(rooms, key=lambda room: _outside(room, x, y)).id
 
@@ -165,8 +173,3 @@ def _refuse(file: Path, entry: _Object, field: str, expected: str, received: obj
     raise InputError(
         file=file, field=f"object {entry.id}: {field}", expected=expected, received=received
     )
-
-
-def background_nodes(read: MeshFile) -> Iterator[str]:
-    """Names of the nodes that `label_by_name` leaves to the background."""
-    return (node[0] for node in read.nodes if _named(node) is None)

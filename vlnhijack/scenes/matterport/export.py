@@ -17,7 +17,7 @@ from PIL import Image
 from vlnhijack import display
 from vlnhijack.artifacts import atomic_folder, write_bytes, write_json, write_text
 from vlnhijack.errors import InputError
-from vlnhijack.navigation.graph import UPRIGHT, save_graph
+from vlnhijack.navigation.graph import UPRIGHT, GraphFolder, save_graph
 from vlnhijack.scenes.categories import mpcat40_id
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import check_name
@@ -33,8 +33,7 @@ def export_scan(house: House, folder: Path, skyboxes: Iterable[tuple[str, Images
     """Write a baked house, and the six images (6,N,N,3) of viewpoints; the folder of the scan.
 
     Objects are numbered in the order of the house. The poses of the graph become upright, as the
-    images of `rendering.skybox` are. Raises InputError for a lit house, and for
-    mirrored textures.
+    images of `rendering.skybox` are. Raises InputError for a lit house, and for mirrored textures.
     """
     check_name(house.name, folder)
     mirrored = [surface.name for surface in house.surfaces if surface.wrap == "mirror"]
@@ -50,9 +49,9 @@ def export_scan(house: House, folder: Path, skyboxes: Iterable[tuple[str, Images
         for viewpoint, images in skyboxes:
             for side, image in enumerate(images):
                 _write_jpeg(new / PART / f"{viewpoint}_skybox{side}_sami.jpg", image)
-    upright = replace(house.graph, rotations=UPRIGHT[None])
-    save_graph(upright, folder / "connectivity")
-    write_text(folder / "connectivity" / "scans.txt", f"{house.name}\n")
+    graphs = folder / "connectivity"
+    save_graph(replace(house.graph, rotations=UPRIGHT[None]), graphs)
+    write_text(graphs / "scans.txt", "".join(f"{scan}\n" for scan in GraphFolder(graphs)))
     return folder / house.name
 
 

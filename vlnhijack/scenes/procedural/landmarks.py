@@ -114,6 +114,8 @@ def _sightings(
 
 def _visible_shares(house: House) -> NDArray[np.float64]:
     """Share (viewpoints, objects) of each object's surface points whose ray first hits it."""
+    if not house.objects:
+        return np.zeros((len(house.graph.viewpoints), 0))
     meshes = [_mesh(surface) for surface in house.surfaces]
     targets = {thing.id: row for row, thing in enumerate(house.objects)}
     owners = [targets.get(surface.object_id or "", -1) for surface in house.surfaces]

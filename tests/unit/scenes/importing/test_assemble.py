@@ -1,5 +1,7 @@
 """Houses of source meshes look like the meshes, before and after objects are unwrapped."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,14 @@ def test_objects_share_textures_until_they_are_unwrapped() -> None:
     with pytest.raises(InputError, match="house unwrap"):
         house.surface("table_0")
     assert unwrapped(house, ["ball"]).surface("ball").wrap == "clamp"
+
+
+def test_unwrapped_objects_share_no_texture(tmp_path) -> None:
+    house = unwrapped(house_of(furnished_room()), ["ball"])
+    *others, ball = house.surfaces
+    for wrong in (replace(ball, wrap="repeat"), replace(ball, texture=others[0].texture)):
+        with pytest.raises(InputError, match="textures.*ball"):
+            save_house(replace(house, surfaces=(*others, wrong)), tmp_path / "made")
 
 
 def test_shared_textures_are_one_file(tmp_path) -> None:

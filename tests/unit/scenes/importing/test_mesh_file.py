@@ -9,7 +9,7 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz import refused_or_read
+from tests.fuzz import refused_or_read, texts
 from tests.mesh_files import write_glb, write_obj, write_ply
 from tests.source_room import picture
 from vlnhijack import display
@@ -138,9 +138,24 @@ def test_labels_of_a_file(tmp_path) -> None:
         label_by_file(read, labels)
 
 
+LABELS = {
+    "rooms": [{"id": "r", "label": "office", "bounds": [0, 0, 2, 2]}],
+    "objects": [{"id": "tv", "category": "tv_monitor", "room": "r", "faces": [[0, 2], [3, 5]]}],
+}
+
+
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(content=texts(LABELS))
+def test_broken_labels_are_refused_in_one_line(tmp_path, content: bytes) -> None:
+    read = read_mesh(written(tmp_path, "ply"))
+    refused_or_read(tmp_path / "labels.json", content, lambda file: label_by_file(read, file))
+
+
 @pytest.mark.parametrize("kind", ["glb", "obj", "ply"])
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_broken_files_are_refused_in_one_line(tmp_path, kind: str, data) -> None:
