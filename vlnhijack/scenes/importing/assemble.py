@@ -38,10 +38,11 @@ def _surfaces(source: SourceMesh) -> Iterator[Surface]:
     textures: dict[int, NDArray[np.float32]] = {}
     for owner, index, rows in _groups(source):
         material = source.materials[index]
-        if index not in textures:
-            textures[index] = _texture(material)
+        look = id(material if material.image is None else material.image)
+        if look not in textures:
+            textures[look] = _texture(material)
         prefix = "background" if owner == BACKGROUND else source.objects[owner].id
-        corner_uv, texture = source.corner_uv[rows], textures[index]
+        corner_uv, texture = source.corner_uv[rows], textures[look]
         colours = _corner_colours(source, rows)
         if colours is not None:
             texture, corner_uv = bake_patches(colours, corner_uv, texture, material.wrap)
