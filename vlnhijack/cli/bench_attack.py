@@ -31,6 +31,7 @@ def attack(
     """Seconds of an attack's iteration by stage, its memory, and what bfloat16 changes."""
     from vlnhijack.artifacts import write_json
     from vlnhijack.experiments.bench.attack import bench_attack
+    from vlnhijack.experiments.bench.costs import machine
     from vlnhijack.experiments.bench.paper_scale import PRESETS, paper_scale
     from vlnhijack.experiments.runner import make_repeatable
     from vlnhijack.scenes.house_files import load_house
@@ -42,7 +43,8 @@ def attack(
         cost = bench_attack(scale, progress)
     settings = {"preset": preset.value, "house": house, "seed": seed, "threads": threads}
     rows = [vars(row) for row in cost.rows]
-    write_json(out / "attack.json", {**cost.summary(), "rows": rows, "settings": settings})
+    record = {**cost.summary(), "rows": rows, "settings": settings, "machine": machine()}
+    write_json(out / "attack.json", record)
     if as_json:
         print(json.dumps(cost.summary()))
     else:
@@ -56,23 +58,22 @@ def _print(cost: "AttackCost", settings: dict[str, Any]) -> None:
     from vlnhijack.experiments.bench.attack import NAIVE_EPISODES, PAPER_ITERATIONS
 
     table = Table(title=", ".join(f"{name} {value}" for name, value in settings.items()))
-    numbers = ("s per\niteration", *cost.rows[0].stages, "×\nnaive", "MB", "loss\nerror")
-    for name in ("vision", "policy", *numbers, "gradient\ncosine"):
-        table.add_column(name, justify="left" if name in ("vision", "policy") else "right")
-    for row in cost.rows:
-        table.add_row(
-            row.vision,
-            row.policy,
-            *(f"{seconds:.2f}" for seconds in (row.seconds, *row.stages.values())),
-            f"{cost.naive_seconds / row.seconds:.1f}",
-            f"{row.peak_memory_mb:.0f}",
-            f"{row.loss_error:.1e}",
-            f"{row.grad_cosine:.5f}",
-        )
+    rows = cost.rows
+    table.add_column("vision\npolicy")
+    for row in rows:
+        table.add_column(f"{row.vision}\n{row.policy}", justify="right")
+    table.add_row("seconds per iteration", *(f"{row.seconds:.2f}" for row in rows))
+    for stage in rows[0].stages:
+        table.add_row(f"  {stage}", *(f"{row.stages[stage]:.2f}" for row in rows))
+    faster = (cost.naive_seconds / row.seconds for row in rows)
+    table.add_row("× faster than naive", *(f"{ratio:.1f}" for ratio in faster))
+    table.add_row("peak memory, MB", *(f"{row.peak_memory_mb:.0f}" for row in rows))
+    table.add_row("loss error", *(f"{row.loss_error:.1e}" for row in rows))
+    table.add_row("gradient cosine", *(f"{row.grad_cosine:.5f}" for row in rows))
     console.print(table)
     minutes = PAPER_ITERATIONS * cost.rows[-1].seconds / 60
     console.print(
-        f"The default precision is that of the last row: {PAPER_ITERATIONS} iterations take "
+        f"The default precision is that of the last column: {PAPER_ITERATIONS} iterations take "
         f"{minutes:.0f} minutes. The naive way, float32, every episode with its own views and one "
         f"step after the other, takes {cost.naive_seconds:.0f} s per iteration "
         f"(from {NAIVE_EPISODES} episodes)."
