@@ -177,4 +177,6 @@ def _print_exponents(fits: Sequence[Mapping[str, Any]]) -> None:
 
 def _columns(table: "Table", *names: str) -> None:
     for name in ("rung", "spp", *names):
-        table.add_column(name, justify="left" if name == "rung" else "right")
+        table.add_column(
+            name, justify="left" if name == "rung" else "right", no_wrap=name == "rung"
+        )
