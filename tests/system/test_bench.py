@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from tests.houses import tiny_house
 from vlnhijack.cli import app
-from vlnhijack.errors import InputError
+from vlnhijack.errors import CheckError, InputError
 from vlnhijack.experiments.bench import reference, render, scaling
 from vlnhijack.experiments.bench.reference import Mean, Reference
 from vlnhijack.experiments.bench.render import Row
@@ -162,6 +162,12 @@ def test_the_fullest_view_can_be_narrowed_to_an_object_and_a_viewpoint() -> None
     assert fullest_view(house, "table_0", other)[1].viewpoint == other
     with pytest.raises(InputError, match="viewpoint"):
         fullest_view(house, viewpoint="nowhere")
+
+
+def test_a_view_without_the_object_is_refused() -> None:
+    away = replace(CAMERA, heading=CAMERA.heading + np.pi, elevation=0.4)
+    with pytest.raises(CheckError, match="lost in noise"):
+        reference.converged(Subject(tiny_house(), "cabinet_0", [away]), lambda: None)
 
 
 def test_a_number_of_samples_that_is_no_square_is_refused() -> None:

@@ -16,10 +16,10 @@ from vlnhijack.frames import Camera
 from vlnhijack.rendering.filters import Filters
 from vlnhijack.rendering.samples import RAYS_AT_ONCE, SAMPLER
 from vlnhijack.rendering.transport import Transport, csr, with_adjoint
-from vlnhijack.rendering.variant import torch_device
+from vlnhijack.rendering.variant import chosen, torch_device
 from vlnhijack.scenes.house import House
 
-_FORMAT = "vlnhijack transport 1"
+_FORMAT = "vlnhijack transport 2"
 _TENSORS = ("starts", "columns", "values", "background")
 
 
@@ -31,16 +31,16 @@ def fingerprint(
     seed: int,
     filters: Filters,
 ) -> str:
-    """SHA-256 of geometry, cameras, samples, filters and all textures but the object's."""
+    """SHA-256 of variant, geometry, cameras, samples, filters and textures but the object's."""
     digest = hashlib.sha256()
     views = [astuple(camera) for camera in cameras]
-    settings = (object_id, views, SAMPLER, RAYS_AT_ONCE, spp, seed, astuple(filters))
+    settings = (chosen(), object_id, views, SAMPLER, RAYS_AT_ONCE, spp, seed, astuple(filters))
     digest.update(json.dumps(settings).encode())
     for surface in house.surfaces:
         arrays = [surface.vertices, surface.faces, surface.uv]
         is_object = surface.object_id == object_id
         arrays += [] if is_object else [surface.texture]
-        digest.update(json.dumps([surface.texture.shape, is_object]).encode())
+        digest.update(json.dumps([surface.texture.shape, surface.wrap, is_object]).encode())
         for array in arrays:
             digest.update(json.dumps([array.shape, str(array.dtype)]).encode())
             digest.update(array.tobytes())

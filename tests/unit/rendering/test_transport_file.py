@@ -47,6 +47,7 @@ def test_a_stale_file_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_the_key_follows_everything_but_the_objects_texels() -> None:
     house = tiny_house()
     white = np.ones((64, 64, 3), np.float32)
+    wrapped = replace(house.surfaces[0], wrap="repeat")
     moved = replace(house.surfaces[0], vertices=house.surfaces[0].vertices + np.float32(1e-3))
     changes = [
         (house, OBJECT, [CAMERA], 4, 0, Filters()),
@@ -57,6 +58,14 @@ def test_the_key_follows_everything_but_the_objects_texels() -> None:
         (house, OBJECT, [CAMERA], 4, 0, Filters("gaussian")),
         (house.with_texture("table_0", white), OBJECT, [CAMERA], 4, 0, Filters()),
         (replace(house, surfaces=(moved, *house.surfaces[1:])), OBJECT, [CAMERA], 4, 0, Filters()),
+        (
+            replace(house, surfaces=(wrapped, *house.surfaces[1:])),
+            OBJECT,
+            [CAMERA],
+            4,
+            0,
+            Filters(),
+        ),
     ]
     keys = {fingerprint(*change) for change in changes}
     assert len(keys) == len(changes)

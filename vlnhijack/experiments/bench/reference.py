@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from vlnhijack import seeds
+from vlnhijack.errors import CheckError
 from vlnhijack.experiments.bench.costs import clear
 from vlnhijack.experiments.bench.subject import Subject
 
@@ -54,7 +55,7 @@ class Reference:
         along = float((gradient.double() * self.gradient.value).sum()) / self.gradient.energy
         ratio = float(gradient.double().norm()) / self.gradient.energy**0.5
         rmse = (max(square, 0.0) / image.numel()) ** 0.5
-        return Errors(rmse, along / ratio, ratio, along - 1)
+        return Errors(rmse, along / ratio if ratio else 0.0, ratio, along - 1)
 
     def own_errors(self) -> dict[str, float]:
         """Expected RMSE of the image, and length of the gradient's error over the gradient's."""
@@ -75,7 +76,12 @@ def converged(subject: Subject, advance: Callable[[], None]) -> Reference:
         for total, value in zip(sums, subject.gradient(renderer), strict=True):
             total.add(value)
         advance()
-    return Reference(*(total.mean() for total in sums))
+    reference = Reference(*(total.mean() for total in sums))
+    if reference.gradient.energy <= 0:
+        raise CheckError(
+            "the gradient of this view is lost in noise: choose another one, or a larger"
+        )
+    return reference
 
 
 class _Sum:

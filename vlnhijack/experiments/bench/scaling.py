@@ -13,6 +13,7 @@ from vlnhijack import seeds
 from vlnhijack.experiments.bench.costs import measure
 from vlnhijack.experiments.bench.subject import RUNGS, Subject
 from vlnhijack.scenes.house import House
+from vlnhijack.scenes.importing.reduction import face_count
 from vlnhijack.scenes.surface import Surface
 
 SPP = 4
@@ -55,7 +56,7 @@ class _Step:
 def bench_scaling(subject: Subject, ladders: Ladders, progress: Progress) -> list[Point]:
     """A point for every step of every ladder and rung, each after a warm-up."""
     rungs = RUNGS[subject.house.kind]
-    task = progress.add_task("scaling", total=len(list(_steps(subject, ladders))) * len(rungs))
+    task = progress.add_task("scaling", total=None)
     points = []
     for step in _steps(subject, ladders):
         for rung in rungs:
@@ -78,10 +79,10 @@ def exponents(points: Sequence[Point]) -> list[dict[str, str | float]]:
 
 def _steps(subject: Subject, ladders: Ladders) -> Iterator[_Step]:
     house = subject.house
-    yield _Step("faces", _faces(house), subject)
-    while _faces(house) < ladders.most_faces:
+    yield _Step("faces", face_count(house), subject)
+    while face_count(house) < ladders.most_faces:
         house = replace(house, surfaces=tuple(map(_subdivided, house.surfaces)))
-        yield _Step("faces", _faces(house), replace(subject, house=house))
+        yield _Step("faces", face_count(house), replace(subject, house=house))
     for side in ladders.texture_sides:
         yield _Step("texels", side**2, replace(subject, house=_retextured(subject, side)))
     (camera,) = subject.cameras
@@ -105,10 +106,6 @@ def _measured(step: _Step, rung: str) -> Point:
 def _slope(points: Sequence[tuple[float, float]]) -> float:
     x, y = np.log(np.maximum(points, 1e-9)).T
     return float(np.polyfit(x, y, 1)[0])
-
-
-def _faces(house: House) -> int:
-    return sum(len(surface.faces) for surface in house.surfaces)
 
 
 def _subdivided(surface: Surface) -> Surface:
