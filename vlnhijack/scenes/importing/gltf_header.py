@@ -68,6 +68,27 @@ class _Buffer(_Form):
     byteLength: NonNegativeInt
 
 
+class _Primitive(_Form):
+    material: NonNegativeInt | None = None
+
+
+class _Mesh(_Form):
+    primitives: tuple[_Primitive, ...] = ()
+
+
+class _Node(_Form):
+    children: tuple[NonNegativeInt, ...] = ()
+    mesh: NonNegativeInt | None = None
+    matrix: Annotated[tuple[float, ...], Field(min_length=16, max_length=16)] | None = None
+    translation: tuple[float, float, float] | None = None
+    rotation: tuple[float, float, float, float] | None = None
+    scale: tuple[float, float, float] | None = None
+
+
+class _Scene(_Form):
+    nodes: tuple[NonNegativeInt, ...] = ()
+
+
 class GltfHeader(_Form):
     """The parts of the JSON that are needed here."""
 
@@ -77,6 +98,10 @@ class GltfHeader(_Form):
     samplers: tuple[_Sampler, ...] = ()
     images: tuple[_Image, ...] = ()
     buffers: tuple[_Buffer, ...] = ()
+    meshes: tuple[_Mesh, ...] = ()
+    nodes: tuple[_Node, ...] = ()
+    scenes: tuple[_Scene, ...] = ()
+    scene: NonNegativeInt | None = None
 
     def texture(self, material: _Material) -> _Texture | None:
         """The base-colour texture of a material."""
@@ -125,6 +150,7 @@ def read_header(file: Path) -> tuple[GltfHeader, bytes]:
             received=", ".join(unread),
         )
     _check_references(file, header)
+    _check_trees(file, header)
     for number, material in enumerate(tree.get("materials", [])):
         material["name"] = str(number)
     return header, _packed(tree, rest)
@@ -155,12 +181,19 @@ def _packed(tree: Any, rest: bytes | None) -> bytes:
 
 
 def _check_references(file: Path, header: GltfHeader) -> None:
-    """InputError where a material, texture or sampler points to what is not there."""
+    """InputError where something points to what is not there."""
     infos = [m.pbrMetallicRoughness.baseColorTexture for m in header.materials]
+    primitives = [primitive for mesh in header.meshes for primitive in mesh.primitives]
+    children = [child for node in header.nodes for child in node.children]
+    roots = [root for scene in header.scenes for root in scene.nodes]
     references: list[tuple[str, int, list[int | None]]] = [
         ("textures", len(header.textures), [i.index for i in infos if i is not None]),
         ("images", len(header.images), [t.source for t in header.textures]),
         ("samplers", len(header.samplers), [t.sampler for t in header.textures]),
+        ("materials", len(header.materials), [p.material for p in primitives]),
+        ("meshes", len(header.meshes), [node.mesh for node in header.nodes]),
+        ("nodes", len(header.nodes), [*children, *roots]),
+        ("scenes", len(header.scenes), [header.scene]),
     ]
     for field, count, indices in references:
         wrong = [index for index in indices if index is not None and index >= count]
@@ -171,4 +204,21 @@ def _check_references(file: Path, header: GltfHeader) -> None:
     if any(info is not None and info.texCoord for info in infos):
         raise InputError(
             file=file, field="texCoord", expected="base colours on TEXCOORD_0", received="another"
+        )
+
+
+def _check_trees(file: Path, header: GltfHeader) -> None:
+    """InputError where a node has two parents, or is below itself."""
+    children = [child for node in header.nodes for child in node.children]
+    waiting = sorted(set(range(len(header.nodes))) - set(children))
+    reached, has_one_parent = 0, len(set(children)) == len(children)
+    while waiting and has_one_parent:
+        waiting += header.nodes[waiting.pop()].children
+        reached += 1
+    if reached < len(header.nodes):
+        raise InputError(
+            file=file,
+            field="nodes",
+            expected="trees, each node with one parent at most",
+            received="a node with two, or below itself",
         )

@@ -1,5 +1,6 @@
 """Mesh files of every kind become our world; broken ones are refused in one line."""
 
+import json
 import re
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from tests.source_room import picture
 from vlnhijack import display
 from vlnhijack.errors import InputError
 from vlnhijack.scenes.importing import memory
+from vlnhijack.scenes.importing.gltf_header import _packed
 from vlnhijack.scenes.importing.labels import label_by_file, label_by_name
 from vlnhijack.scenes.importing.mesh_file import ReadOptions, read_mesh
 
@@ -120,6 +122,29 @@ def test_more_than_the_memory_is_refused(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(memory, "_available", lambda: 1000)
     with pytest.raises(InputError, match="GB"):
         read_mesh(written(tmp_path, "ply"))
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"matrix": [float("nan")] * 16}, "nodes.*matrix"),
+        ({"translation": [0, float("inf"), 0]}, "nodes.*translation"),
+        ({"mesh": 999}, "meshes: expected indices below"),
+        ({"children": [999]}, "nodes: expected indices below"),
+        ({"children": [0]}, "nodes: expected trees"),
+    ],
+)
+def test_nodes_that_make_no_scene_are_refused(tmp_path, change: dict, field: str) -> None:
+    file = tmp_path / "a.glb"
+    write_glb(file)
+    content = file.read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    tree = json.loads(content[20 : 20 + length])
+    node = tree["nodes"][0]
+    (node.pop("matrix", None), node.update(change))
+    file.write_bytes(_packed(tree, content[20 + length :]))
+    with pytest.raises(InputError, match=field):
+        read_mesh(file)
 
 
 def test_labels_of_a_file(tmp_path) -> None:
