@@ -56,6 +56,15 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def require_replaceable(folder: Path, sign: str) -> None:
+    """InputError where there are other files, those of a folder without `sign`, to be lost."""
+    if not folder.exists() or (folder / sign).exists():
+        return
+    if not folder.is_dir() or any(folder.iterdir()):
+        expected = f"a new or empty folder, or one with {sign}"
+        raise InputError(file=folder, expected=expected, received="other files")
+
+
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
     """A temporary folder that replaces `path` (if any) when the block succeeds."""

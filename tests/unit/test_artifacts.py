@@ -4,7 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from vlnhijack.artifacts import append_row, atomic_folder, atomic_path, read_rows, write_json
+from vlnhijack.artifacts import (
+    append_row,
+    atomic_folder,
+    atomic_path,
+    read_rows,
+    require_replaceable,
+    write_json,
+)
+from vlnhijack.errors import InputError
 
 FULL = "No space left on device"
 
@@ -23,6 +31,19 @@ def test_a_full_disk_is_named_and_leaves_the_old_one(tmp_path: Path, atomic: Cal
         fill(new)
     assert caught.value.filename == str(place)
     assert {path: path.is_dir() or path.read_text() for path in tmp_path.rglob("*")} == before
+
+
+def test_only_folders_of_the_kind_are_replaced(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    require_replaceable(folder, "house.json")
+    folder.mkdir()
+    require_replaceable(folder, "house.json")
+    (folder / "thesis.tex").write_text("years of work")
+    for place in (folder, folder / "thesis.tex"):
+        with pytest.raises(InputError, match="or one with house.json, received 'other files'"):
+            require_replaceable(place, "house.json")
+    (folder / "house.json").write_text("{}")
+    require_replaceable(folder, "house.json")
 
 
 def test_writing_to_a_full_device_names_the_file() -> None:

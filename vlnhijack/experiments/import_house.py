@@ -7,10 +7,11 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from vlnhijack.navigation.episode import save_episodes
+from vlnhijack.artifacts import require_replaceable
+from vlnhijack.navigation.episode import episode_records
 from vlnhijack.navigation.graph import NavigationGraph, load_graph
 from vlnhijack.scenes.house import House, Room
-from vlnhijack.scenes.house_files import check_name, load_house, save_house
+from vlnhijack.scenes.house_files import HOUSE_FILE, check_name, load_house, save_house
 from vlnhijack.scenes.importing.assemble import assemble
 from vlnhijack.scenes.importing.free_space import make_walking_graph
 from vlnhijack.scenes.importing.labels import label_by_file, label_by_name
@@ -42,6 +43,7 @@ def import_mesh(
 ) -> list[str]:
     """Write the house of a mesh file to `folder`, as a whole or not at all; lines about it."""
     check_name(name, folder)
+    require_replaceable(folder, HOUSE_FILE)
     started = time.perf_counter()
     stages = Stages(progress, name, total=7 if options.unwrap_all else 6)
     stages.next("read")
@@ -97,9 +99,8 @@ def write_house(
     stages.next("episodes")
     train, val_seen = make_episodes(house, options.seed)
     stages.next("writing")
-    save_house(house, folder)
-    for split, episodes in (("train", train), ("val_seen", val_seen)):
-        save_episodes(folder / "episodes" / f"{split}.json", episodes)
+    records = {"train": episode_records(train), "val_seen": episode_records(val_seen)}
+    save_house(house, folder, records)
     stages.finish()
     return [
         f"faces: {len(source.faces)}; seen from the back {sides.seen_from_back}, "

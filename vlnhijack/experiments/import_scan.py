@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
+from vlnhijack.artifacts import require_replaceable
 from vlnhijack.experiments.import_house import ImportOptions, Stages, write_house
 from vlnhijack.navigation.graph import scan_graph
-from vlnhijack.scenes.house_files import check_name
+from vlnhijack.scenes.house_files import HOUSE_FILE, check_name
 from vlnhijack.scenes.importing.mesh_file import read_mesh
 from vlnhijack.scenes.importing.source_mesh import SourceMesh
 from vlnhijack.scenes.matterport.house_file import read_house_file
@@ -17,8 +18,6 @@ from vlnhijack.scenes.matterport.labels import label
 from vlnhijack.scenes.matterport.matching import REACH, MatchQuality, match_objects
 from vlnhijack.scenes.matterport.scan_files import scan_files
 from vlnhijack.scenes.matterport.segmentation import Segmentation, read_segmentation
-
-STAGES = 8
 
 
 def import_scan(
@@ -28,8 +27,9 @@ def import_scan(
 
     connectivity: a folder or archive of graphs; of the options, the labels play no part.
     """
+    require_replaceable(folder, HOUSE_FILE)
     started = time.perf_counter()
-    stages = Stages(progress, scan.resolve().name, STAGES)
+    stages = Stages(progress, scan.resolve().name, total=9 if options.unwrap_all else 8)
     stages.next("files")
     with scan_files(scan) as files:
         check_name(files.name, scan)

@@ -6,10 +6,11 @@ from pathlib import Path
 from rich.progress import Progress
 
 from vlnhijack import seeds
-from vlnhijack.navigation.episode import Episode, save_episodes
+from vlnhijack.artifacts import require_replaceable
+from vlnhijack.navigation.episode import Episode, episode_records
 from vlnhijack.rendering.bake import bake
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import check_name, save_house
+from vlnhijack.scenes.house_files import HOUSE_FILE, check_name, save_house
 from vlnhijack.scenes.procedural.episodes import make_episodes, viewpoint_overlap
 from vlnhijack.scenes.procedural.house_maker import make_house
 
@@ -30,6 +31,7 @@ def make_house_folder(
     houses get all their episodes as val_unseen, others as train and val_seen.
     """
     check_name(name, folder)
+    require_replaceable(folder, HOUSE_FILE)
     task = progress.add_task(f"{name}: geometry", total=3)
     started = time.perf_counter()
     house = make_house(name, seed)
@@ -38,9 +40,7 @@ def make_house_folder(
     progress.update(task, completed=2, description=f"{name}: light")
     if not lit:
         house = bake(house, spp, seeds.integer(seed, "bake"))
-    save_house(house, folder)
-    for split, episodes in splits.items():
-        save_episodes(folder / "episodes" / f"{split}.json", episodes)
+    save_house(house, folder, {split: episode_records(found) for split, found in splits.items()})
     progress.update(task, completed=3)
     return (
         f"{folder}: {house.kind}, {len(house.rooms)} rooms, {len(house.objects)} objects, "

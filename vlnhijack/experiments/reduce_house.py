@@ -1,22 +1,22 @@
 """Reduce a house to a budget, and measure what that costs and gains."""
 
 import re
-import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.progress import Progress
 
+from vlnhijack.artifacts import read_json, require_replaceable
 from vlnhijack.errors import InputError
 from vlnhijack.frames import Camera
 from vlnhijack.navigation.views import panorama_cameras
 from vlnhijack.rendering.observe import render_views
 from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import load_house, save_house
+from vlnhijack.scenes.house_files import HOUSE_FILE, load_house, save_house
 from vlnhijack.scenes.importing.reduction import face_count, reduce_faces, reduce_texels
 
 VIEWPOINTS, WIDTH, HEIGHT, SPP = 8, 160, 120, 16
@@ -62,6 +62,7 @@ def reduce_folder(
     Without a budget, the smallest that keeps the RMSE of the compared views at or below max_error:
     first of faces, then of texels, each halved as long as that holds.
     """
+    require_replaceable(out, HOUSE_FILE)
     house = load_house(folder)
     task = progress.add_task(f"{house.name}: the original", total=None)
     views = _Views(house)
@@ -79,10 +80,13 @@ def reduce_folder(
                 if measured.rmse > max_error:
                     break
                 reduced = smaller
-    save_house(reduced, out)
-    if out.resolve() != folder.resolve() and (folder / "episodes").is_dir():
-        shutil.copytree(folder / "episodes", out / "episodes", dirs_exist_ok=True)
+    save_house(reduced, out, None if out.resolve() == folder.resolve() else _episodes(folder))
     return rows
+
+
+def _episodes(folder: Path) -> dict[str, list[dict[str, Any]]]:
+    """The records of each split of a house."""
+    return {file.stem: read_json(file) for file in sorted((folder / "episodes").glob("*.json"))}
 
 
 class _Views:

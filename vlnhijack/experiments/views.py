@@ -15,7 +15,7 @@ from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.navigation.views import VIEWS, panorama_cameras
 from vlnhijack.rendering.coverage import depth_map, object_coverage, object_index_map
 from vlnhijack.rendering.observe import render_views
-from vlnhijack.scenes.house import House
+from vlnhijack.scenes.house import House, nearest_room
 
 _CHUNK = 8 * VIEWS
 Advance = Callable[[int], None]
@@ -104,11 +104,7 @@ def _patch_means(values: NDArray[np.float32], patch: int) -> NDArray[np.float32]
 def _room_labels(house: House, rooms: Sequence[str]) -> list[int]:
     labels = []
     for x, y, _ in house.graph.positions.tolist():
-        distance = [
-            max(r.bounds[0] - x, x - r.bounds[2], r.bounds[1] - y, y - r.bounds[3])
-            for r in house.rooms
-        ]
-        label = house.rooms[int(np.argmin(distance))].label
+        label = nearest_room(house.rooms, x, y).label
         if label not in rooms:
             raise InputError(file=house.name, field="rooms", expected=rooms, received=label)
         labels.append(rooms.index(label))

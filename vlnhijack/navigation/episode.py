@@ -72,7 +72,12 @@ def by_scan(episodes: Iterable[Episode]) -> dict[str, list[Episode]]:
 
 
 def save_episodes(file: Path, episodes: Iterable[Episode]) -> None:
-    """Write episodes in R2R form, those of one path as one record."""
+    """Write episodes in R2R form."""
+    write_json(file, episode_records(episodes))
+
+
+def episode_records(episodes: Iterable[Episode]) -> list[dict[str, Any]]:
+    """Records in R2R form, one of all episodes of a path."""
     records: dict[tuple[str, int], dict[str, Any]] = {}
     for episode in episodes:
         record = records.setdefault(
@@ -89,7 +94,7 @@ def save_episodes(file: Path, episodes: Iterable[Episode]) -> None:
         record["instructions"].append(episode.instruction)
         if episode.encoding is not None:
             record.setdefault("instr_encodings", []).append(list(episode.encoding))
-    write_json(file, list(records.values()))
+    return list(records.values())
 
 
 def _r2r_episodes(file: Path, graphs: Mapping[str, NavigationGraph]) -> Iterator[Episode]:

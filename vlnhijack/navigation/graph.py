@@ -19,12 +19,13 @@ from vlnhijack.errors import InputError
 
 UPRIGHT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
 _SUFFIX = "_connectivity.json"
+_FILE_NAME = r"^[^/\\\s\x00]*[^/\\\s\x00.][^/\\\s\x00]*$"  # pictures are named by viewpoints
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _Record(BaseModel):
     model_config = ConfigDict(strict=True)
-    image_id: str
+    image_id: Annotated[str, Field(pattern=_FILE_NAME)]
     pose: Annotated[list[_Finite], Field(min_length=16, max_length=16)]
     included: bool
     unobstructed: list[bool]

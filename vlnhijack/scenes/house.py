@@ -1,7 +1,9 @@
 """A house: surfaces, objects, rooms, lights and a navigation graph."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 from typing import Literal
 
 import numpy as np
@@ -34,6 +36,16 @@ class Room:
     id: str
     label: str
     bounds: tuple[float, float, float, float]
+
+
+def nearest_room(rooms: Sequence[Room], x: float, y: float) -> Room:
+    """The room whose rectangle is nearest to a point; the first of several."""
+
+    def distance(room: Room) -> float:
+        x0, y0, x1, y1 = room.bounds
+        return hypot(max(x0 - x, 0, x - x1), max(y0 - y, 0, y - y1))
+
+    return min(rooms, key=distance)
 
 
 @dataclass(frozen=True)

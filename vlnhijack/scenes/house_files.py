@@ -25,6 +25,7 @@ from vlnhijack import display
 from vlnhijack.artifacts import (
     atomic_folder,
     read_json,
+    require_replaceable,
     sha256,
     validated,
     write_json,
@@ -40,6 +41,7 @@ from vlnhijack.scenes.surface import Surface, Wrap
 
 T = TypeVar("T")
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+HOUSE_FILE = "house.json"
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -84,8 +86,9 @@ def save_house(
     """Write a house as a whole or not at all; textures are rounded to 8 bits.
 
     episodes: split → R2R-form records; None keeps those that the folder holds. Raises InputError
-    where names or objects are inconsistent.
+    where names or objects are inconsistent, and where the folder holds other files than a house.
     """
+    require_replaceable(folder, HOUSE_FILE)
     _check(house, folder)
     with atomic_folder(folder) as new:
         hashes: dict[str, str] = {}
@@ -96,7 +99,7 @@ def save_house(
             if texture not in hashes:
                 write_texture(new / texture, surface.texture)
             hashes |= {path: sha256(new / path) for path in (mesh, texture) if path not in hashes}
-        write_json(new / "house.json", _entry(house, hashes).model_dump())
+        write_json(new / HOUSE_FILE, _entry(house, hashes).model_dump())
         write_json(new / "objects.json", _OBJECTS.dump_python(house.objects))
         save_graph(house.graph, new)
         write_text(new / "scene.xml", scene_xml(house))
@@ -113,7 +116,7 @@ def load_house(folder: Path) -> House:
     Raises InputError that names the file and field where anything is missing, corrupt or
     inconsistent, or lies outside the folder.
     """
-    entry = _read(_HOUSE, folder / "house.json")
+    entry = _read(_HOUSE, folder / HOUSE_FILE)
     textures = _load_textures(folder, entry)
     house = House(
         name=entry.name,
@@ -198,7 +201,7 @@ def _verified(folder: Path, relative: str, hashes: dict[str, str]) -> Path:
     path = folder / relative
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(
-            file=folder / "house.json",
+            file=folder / HOUSE_FILE,
             field="surfaces",
             expected="paths inside the house folder",
             received=relative,
@@ -209,7 +212,7 @@ def _verified(folder: Path, relative: str, hashes: dict[str, str]) -> Path:
         raise InputError(
             file=path,
             field="sha256",
-            expected=hashes.get(relative, "an entry in house.json"),
+            expected=hashes.get(relative, f"an entry in {HOUSE_FILE}"),
             received=sha256(path),
         )
     return path

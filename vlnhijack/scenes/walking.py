@@ -90,10 +90,13 @@ def _grow(
     """Rows of places, each a walkable step from an earlier one.
 
     Doorways keep their surroundings free and are taken as soon as they are in reach; then one place
-    near each landmark; then the tightest packing that the spacing allows.
+    near each landmark; then the tightest packing that the spacing allows. Without doorways, the
+    first is any place.
     """
     places = space.places
-    kept = _spaced(places, rng.permutation(space.doorways or 1))
+    count = space.doorways
+    starts = rng.permutation(count) if count else rng.integers(len(places), size=1)
+    kept = _spaced(places, starts)
     gaps = np.linalg.norm(places[:, None] - places[kept], axis=-1).min(axis=1)
     gaps[kept] = np.inf
     reach = np.zeros(len(places), bool)

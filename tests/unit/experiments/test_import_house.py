@@ -6,11 +6,13 @@ import pytest
 from rich.progress import Progress
 from typer.testing import CliRunner
 
+from tests.houses import tiny_house
 from tests.mesh_files import write_glb, write_ply
 from vlnhijack.cli import app
+from vlnhijack.errors import InputError
 from vlnhijack.experiments.house_info import describe
 from vlnhijack.experiments.import_house import ImportOptions, import_mesh, unwrap_folder
-from vlnhijack.scenes.house_files import load_house
+from vlnhijack.scenes.house_files import load_house, save_house
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "apartment.glb"
 
@@ -26,6 +28,28 @@ def test_import_then_unwrap(tmp_path) -> None:
     assert [(o.id, o.unwrapped) for o in house.objects] == [("chair_00", False)]
     unwrap_folder(folder, [])
     assert load_house(folder).surface("chair_00").wrap == "clamp"
+
+
+def test_an_old_house_is_replaced_with_all_its_episodes(tmp_path) -> None:
+    write_glb(tmp_path / "mesh.glb")
+    folder = tmp_path / "small"
+    save_house(tiny_house(), folder, {"val_unseen": [], "train": [{"path_id": 7}]})
+    with Progress(disable=True) as progress:
+        import_mesh(tmp_path / "mesh.glb", "small", folder, ImportOptions(), progress)
+    assert sorted(p.name for p in (folder / "episodes").iterdir()) == [
+        "train.json",
+        "val_seen.json",
+    ]
+    assert 'path_id": 7' not in (folder / "episodes" / "train.json").read_text()
+
+
+def test_other_files_are_kept_before_any_work(tmp_path) -> None:
+    write_glb(tmp_path / "mesh.glb")
+    progress = Progress(disable=True)
+    with pytest.raises(InputError, match="other files"):
+        import_mesh(tmp_path / "mesh.glb", "small", tmp_path, ImportOptions(), progress)
+    assert not progress.tasks
+    assert [path.name for path in tmp_path.iterdir()] == ["mesh.glb"]
 
 
 def test_a_coloured_mesh_without_objects(tmp_path) -> None:

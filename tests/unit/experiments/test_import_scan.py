@@ -12,12 +12,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rich.progress import Progress
 
 from tests.fuzz import broken
 from tests.houses import tiny_house
 from tests.scans import import_quietly, pack, tiny_scan
 from vlnhijack.errors import InputError
-from vlnhijack.scenes.house_files import load_house
+from vlnhijack.experiments.import_house import ImportOptions
+from vlnhijack.experiments.import_scan import import_scan
+from vlnhijack.scenes.house_files import load_house, save_house
+from vlnhijack.scenes.importing.mesh_file import ReadOptions
 from vlnhijack.scenes.matterport.export import export_scan
 from vlnhijack.scenes.ply import read_elements, write_elements
 
@@ -51,12 +55,33 @@ def test_packed_and_plain_scans_are_the_same(scan: Path, tmp_path: Path) -> None
         assert (tmp_path / "plain" / file).read_bytes() == (tmp_path / "packed" / file).read_bytes()
 
 
+@pytest.mark.parametrize("unwrap_all", [False, True])
+def test_the_bar_of_an_import_ends_full(scan: Path, tmp_path: Path, unwrap_all: bool) -> None:
+    options = ImportOptions(ReadOptions(up="z"), unwrap_all=unwrap_all)
+    with Progress(disable=True) as progress:
+        import_scan(scan, scan.parent / "connectivity", tmp_path / "house", options, progress)
+    assert progress.tasks[0].completed == progress.tasks[0].total
+
+
 def test_graphs_of_several_houses_lie_together(tmp_path: Path) -> None:
     for name in ("second", "first"):
         house = replace(tiny_house(), name=name)
         graph = replace(house.graph, scan=name)
         export_scan(replace(house, graph=graph), tmp_path, [])
     assert (tmp_path / "connectivity" / "scans.txt").read_text() == "first\nsecond\n"
+
+
+def test_a_house_is_not_replaced_by_its_scan(tmp_path: Path) -> None:
+    save_house(tiny_house(), tmp_path / NAME)
+    with pytest.raises(InputError, match="matterport_mesh, received 'other files'"):
+        tiny_scan(tmp_path)
+    assert load_house(tmp_path / NAME).name == NAME
+
+
+def test_a_scan_is_not_replaced_by_its_house(scan: Path) -> None:
+    with pytest.raises(InputError, match="house.json, received 'other files'"):
+        import_quietly(scan, scan)
+    assert (scan / MESH).is_dir()
 
 
 @pytest.mark.parametrize("wrong", ["lit", "mirror"])

@@ -94,6 +94,12 @@ def test_what_holds_no_graphs_is_refused(tmp_path: Path) -> None:
         ([RECORDS[0], record("b", 1, [True, False], included=1)], "record 1: included"),
         ([RECORDS[0], record("b", float("nan"), [True, False])], r"record 1: pose\.3"),
         ([RECORDS[0], record("b", 1, [True, False], height="high")], "record 1: height"),
+        ([RECORDS[0], record("../b", 1, [True, False])], "record 1: image_id: .*'../b'"),
+        ([RECORDS[0], record("..", 1, [True, False])], "record 1: image_id: .*'..'"),
+        ([RECORDS[0], record("b\\c", 1, [True, False])], "record 1: image_id"),
+        ([RECORDS[0], record("b c", 1, [True, False])], "record 1: image_id: .*'b c'"),
+        ([RECORDS[0], record("", 1, [True, False])], "record 1: image_id"),
+        ([RECORDS[0], record("b\0", 1, [True, False])], "record 1: image_id"),
         ([RECORDS[0], {"image_id": "b"}], "record 1: pose: expected a value, received 'none'"),
     ],
 )

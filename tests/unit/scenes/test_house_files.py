@@ -54,6 +54,13 @@ def test_textures_are_rounded_to_the_nearest_level(tmp_path: Path) -> None:
     assert np.abs(loaded - texture).max() <= 0.5 / 255 + 1e-6
 
 
+def test_other_files_are_not_replaced_by_a_house(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("kept")
+    with pytest.raises(InputError, match="house.json, received 'other files'"):
+        save_house(tiny_house(), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
 def test_saving_twice_gives_the_same_files_and_keeps_episodes(folder: Path) -> None:
     before = {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
     save_house(tiny_house("lit"), folder)

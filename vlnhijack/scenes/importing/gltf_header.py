@@ -15,6 +15,7 @@ from vlnhijack.scenes.surface import Wrap
 
 _MAGIC, _JSON = b"glTF", b"JSON"
 _READ = ("KHR_materials_", "KHR_lights_", "KHR_texture_transform", "EXT_texture_webp")
+_SPECULAR = "KHR_materials_pbrSpecularGlossiness"
 _WRAPS: dict[int, Wrap] = {code: wrap for wrap, code in WRAP_CODES.items()}
 _Unit = Annotated[float, Field(ge=0, le=1)]
 
@@ -48,6 +49,7 @@ class _Material(_Form):
     name: str = "material"
     alphaMode: str = "OPAQUE"
     pbrMetallicRoughness: _Pbr = _Pbr()
+    extensions: dict[str, Any] = {}
 
 
 class _Texture(_Form):
@@ -133,7 +135,8 @@ def read_header(file: Path) -> tuple[GltfHeader, bytes]:
     """The header, and the file's content in which material i is named str(i).
 
     The names let the materials that trimesh makes be told apart. Raises InputError where the file
-    is truncated, not glTF 2, or needs an extension that is not read here (such as compression).
+    is truncated, not glTF 2, has specular-glossiness materials, or needs an extension that is not
+    read here (such as compression).
     """
     content = file.read_bytes()
     if file.suffix.lower() == ".glb":
@@ -149,6 +152,9 @@ def read_header(file: Path) -> tuple[GltfHeader, bytes]:
             expected="a glTF that needs no compression or other extension",
             received=", ".join(unread),
         )
+    if any(_SPECULAR in material.extensions for material in header.materials):
+        expected = "metallic-roughness materials"
+        raise InputError(file=file, field="materials", expected=expected, received=_SPECULAR)
     _check_references(file, header)
     _check_trees(file, header)
     for number, material in enumerate(tree.get("materials", [])):

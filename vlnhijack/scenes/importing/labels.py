@@ -13,9 +13,14 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, TypeAdapter
 
 from vlnhijack.artifacts import read_json, validated
 from vlnhijack.errors import InputError
-from vlnhijack.scenes.house import Room
+from vlnhijack.scenes.house import Room, nearest_room
 from vlnhijack.scenes.importing.mesh_file import MeshFile
-from vlnhijack.scenes.importing.source_mesh import BACKGROUND, SourceMesh, SourceObject
+from vlnhijack.scenes.importing.source_mesh import (
+    BACKGROUND,
+    SourceMesh,
+    SourceObject,
+    whole_room,
+)
 from vlnhijack.scenes.procedural.phrases import OBJECT_WORDS
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -50,7 +55,7 @@ def label_by_name(read: MeshFile, rooms: tuple[Room, ...] = ()) -> Labelled:
     with a word for the same thing; to the background if there is none. An object is in the room
     nearest to its centre; without rooms, the mesh is one.
     """
-    rooms = rooms or _whole(read.mesh)
+    rooms = rooms or (whole_room(read.mesh),)
     named = [_named(node) for node in read.nodes]
     owners = list(dict.fromkeys(owner for owner in named if owner is not None))
     rank = [BACKGROUND if owner is None else owners.index(owner) for owner in named]
@@ -58,7 +63,7 @@ def label_by_name(read: MeshFile, rooms: tuple[Room, ...] = ()) -> Labelled:
     numbers: Counter[str] = Counter()
     objects = []
     for row, (_, category) in enumerate(owners):
-        room = _nearest_room(read.mesh, face_object == row, rooms)
+        room = _room_of(read.mesh, face_object == row, rooms)
         objects.append(SourceObject(f"{category}_{numbers[category]:02d}", category, room))
         numbers[category] += 1
     return replace(read.mesh, face_object=face_object, objects=tuple(objects)), rooms
@@ -73,7 +78,7 @@ def label_by_file(read: MeshFile, file: Path) -> Labelled:
     labels = validated(_LABELS, read_json(file), file)
     if labels.objects is None:
         return label_by_name(read, labels.rooms)
-    rooms = labels.rooms or _whole(read.mesh)
+    rooms = labels.rooms or (whole_room(read.mesh),)
     face_object = np.full(len(read.mesh.faces), BACKGROUND, np.int32)
     for number, entry in enumerate(labels.objects):
         rows = _faces(read, entry, file)
@@ -113,12 +118,6 @@ def _category(name: str) -> str | None:
     return max(found)[2] if found else None
 
 
-def _whole(mesh: SourceMesh) -> tuple[Room, ...]:
-    x0, y0 = map(float, mesh.vertices[mesh.faces].min(axis=(0, 1))[:2])
-    x1, y1 = map(float, mesh.vertices[mesh.faces].max(axis=(0, 1))[:2])
-    return (Room("room_0", "room", (x0, y0, x1, y1)),)
-
-
 def _faces(read: MeshFile, entry: _Object, file: Path) -> NDArray[np.int64]:
     """Rows of the faces of an object: those of its node, or the ranges among them."""
     if entry.node is None and entry.faces is None:
@@ -154,19 +153,14 @@ def _room(
         return entry.room
     if not mine.any():
         _refuse(file, entry, "faces", "≥ 1 face", 0)
-    return _nearest_room(mesh, mine, rooms)
+    return _room_of(mesh, mine, rooms)
 
 
-def _nearest_room(mesh: SourceMesh, mine: NDArray[np.bool_], rooms: Sequence[Room]) -> str:
+def _room_of(mesh: SourceMesh, mine: NDArray[np.bool_], rooms: Sequence[Room]) -> str:
     """The room nearest to the centre of these faces' box."""
     corners = mesh.vertices[mesh.faces[mine]].reshape(-1, 3)
     x, y = (corners.min(axis=0)[:2] + corners.max(axis=0)[:2]) / 2
-    return min(rooms, key=lambda room: _outside(room, x, y)).id
-
-
-def _outside(room: Room, x: float, y: float) -> float:
-    x0, y0, x1, y1 = room.bounds
-    return float(np.hypot(max(x0 - x, 0, x - x1), max(y0 - y, 0, y - y1)))
+    return nearest_room(rooms, x, y).id
 
 
 def _refuse(file: Path, entry: _Object, field: str, expected: str, received: object) -> None:

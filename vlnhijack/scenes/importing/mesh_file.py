@@ -240,7 +240,7 @@ def _colours(visual: Any, *, linear: bool) -> NDArray[np.uint8] | None:
         if values is None:
             return None
         colours = trimesh.visual.color.to_rgba(values)
-    elif visual.kind == "vertex":
+    elif visual.kind in ("vertex", "face"):
         colours = visual.vertex_colors
     else:
         return None

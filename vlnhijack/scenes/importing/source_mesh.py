@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlnhijack.errors import InputError
+from vlnhijack.scenes.house import Room
 from vlnhijack.scenes.surface import Wrap
 
 BACKGROUND = -1
@@ -132,3 +133,10 @@ class SourceMesh:
                 "give --scale 0.001 if it is in millimetres, 0.01 if in centimetres",
                 received=f"{extent:.4g} m",
             )
+
+
+def whole_room(mesh: SourceMesh) -> Room:
+    """One room as large as the mesh."""
+    used = mesh.vertices[mesh.faces.ravel()]
+    (x0, y0, _), (x1, y1, _) = used.min(0).tolist(), used.max(0).tolist()
+    return Room("room_0", "room", (x0, y0, x1, y1))

@@ -15,7 +15,13 @@ import numpy as np
 from PIL import Image
 
 from vlnhijack import display
-from vlnhijack.artifacts import atomic_folder, write_bytes, write_json, write_text
+from vlnhijack.artifacts import (
+    atomic_folder,
+    require_replaceable,
+    write_bytes,
+    write_json,
+    write_text,
+)
 from vlnhijack.errors import InputError
 from vlnhijack.navigation.graph import UPRIGHT, GraphFolder, save_graph
 from vlnhijack.scenes.categories import mpcat40_id
@@ -27,15 +33,18 @@ from vlnhijack.scenes.ply import write_elements
 from vlnhijack.scenes.surface import Surface
 
 QUALITY = 95
+_MESH = "matterport_mesh"
 
 
 def export_scan(house: House, folder: Path, skyboxes: Iterable[tuple[str, Images]]) -> Path:
     """Write a baked house, and the six images (6,N,N,3) of viewpoints; the folder of the scan.
 
     Objects are numbered in the order of the house. The poses of the graph become upright, as the
-    images of `rendering.skybox` are. Raises InputError for a lit house, and for mirrored textures.
+    images of `rendering.skybox` are. Raises InputError for a lit house, for mirrored textures, and
+    where the folder of the scan holds other files than a scan.
     """
     check_name(house.name, folder)
+    require_replaceable(folder / house.name, _MESH)
     mirrored = [surface.name for surface in house.surfaces if surface.wrap == "mirror"]
     for wrong, field, expected, received in (
         (house.kind != "baked", "kind", "baked, for an export", house.kind),
@@ -44,7 +53,7 @@ def export_scan(house: House, folder: Path, skyboxes: Iterable[tuple[str, Images
         if wrong:
             raise InputError(file=house.name, field=field, expected=expected, received=received)
     with atomic_folder(folder / house.name) as new:
-        _write_mesh(house, new / "matterport_mesh" / house.name)
+        _write_mesh(house, new / _MESH / house.name)
         _write_segmentation(house, new / "house_segmentations")
         for viewpoint, images in skyboxes:
             for side, image in enumerate(images):

@@ -7,8 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlnhijack.scenes.categories import STRUCTURE
-from vlnhijack.scenes.house import Room
-from vlnhijack.scenes.importing.source_mesh import BACKGROUND, SourceMesh, SourceObject
+from vlnhijack.scenes.house import Room, nearest_room
+from vlnhijack.scenes.importing.source_mesh import (
+    BACKGROUND,
+    SourceMesh,
+    SourceObject,
+    whole_room,
+)
 from vlnhijack.scenes.matterport.house_file import HouseFile, Region, ScanObject
 from vlnhijack.scenes.matterport.regions import LABELS
 
@@ -38,9 +43,7 @@ def label(
 def _rooms(mesh: SourceMesh, regions: Sequence[Region]) -> tuple[Room, ...]:
     """The regions, or one room as large as the mesh."""
     if not regions:
-        used = mesh.vertices[mesh.faces.ravel()]
-        (x0, y0, _), (x1, y1, _) = used.min(0).tolist(), used.max(0).tolist()
-        return (Room("region_0", "room", (x0, y0, x1, y1)),)
+        return (whole_room(mesh),)
     return tuple(
         Room(f"region_{number}", LABELS.get(region.code, "room"), (x0, y0, x1, y1))
         for number, region in enumerate(regions)
@@ -53,7 +56,4 @@ def _room(thing: ScanObject, rooms: Sequence[Room]) -> str:
     if thing.region >= 0:
         return rooms[thing.region].id
     x, y, _ = thing.centre
-    distance = [
-        max(x0 - x, x - x1, y0 - y, y - y1) for x0, y0, x1, y1 in (room.bounds for room in rooms)
-    ]
-    return rooms[int(np.argmin(distance))].id
+    return nearest_room(rooms, x, y).id

@@ -9,7 +9,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from vlnhijack import seeds
 from vlnhijack.frames import heading_of
-from vlnhijack.scenes.house import House, Room
+from vlnhijack.scenes.house import House, Room, nearest_room
 from vlnhijack.scenes.surface import Surface
 
 POINTS = 24
@@ -70,10 +70,10 @@ def find_landmarks(house: House) -> Landmarks:
         viewpoint: _sightings(house, footprints, row, shares[row])
         for row, viewpoint in enumerate(house.graph.viewpoints)
     }
-    positions = house.graph.positions
+    places = house.graph.positions.tolist()
     rooms = {
-        viewpoint: min(house.rooms, key=lambda room: box_distance(positions[row], room.bounds))
-        for row, viewpoint in enumerate(house.graph.viewpoints)
+        viewpoint: nearest_room(house.rooms, x, y)
+        for viewpoint, (x, y, _) in zip(house.graph.viewpoints, places, strict=True)
     }
     return Landmarks(house, sightings, rooms, footprints)
 

@@ -102,6 +102,30 @@ def test_ply_colours(tmp_path) -> None:
     assert np.isclose(np.ptp(mesh.vertices[:, 1]), 3), "PLY is z up"
 
 
+def test_ply_colours_of_faces(tmp_path) -> None:
+    box = trimesh.creation.box((2, 3, 2))
+    box.visual.face_colors = [(20 * face, 0, 0, 255) for face in range(12)]
+    (tmp_path / "faces.ply").write_bytes(box.export(file_type="ply"))
+    mesh = read_mesh(tmp_path / "faces.ply").mesh
+    assert mesh.vertex_colours is not None
+    corners = mesh.vertex_colours[mesh.faces]
+    assert np.array_equal(corners[..., 0], np.repeat(20 * np.arange(12)[:, None], 3, 1))
+    assert not corners[..., 1:].any()
+
+
+def test_specular_glossiness_is_refused(tmp_path) -> None:
+    scene = trimesh.load_scene(written(tmp_path, "glb"))
+    for name, content in scene.export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(content)
+    tree = json.loads((tmp_path / "model.gltf").read_text())
+    del tree["materials"][0]["pbrMetallicRoughness"]
+    look = {"diffuseFactor": [1, 0, 0, 1]}
+    tree["materials"][0]["extensions"] = {"KHR_materials_pbrSpecularGlossiness": look}
+    (tmp_path / "model.gltf").write_text(json.dumps(tree))
+    with pytest.raises(InputError, match="materials: expected metallic-roughness materials"):
+        read_mesh(tmp_path / "model.gltf")
+
+
 def test_units(tmp_path) -> None:
     path = written(tmp_path, "ply")
     with pytest.raises(InputError, match=r"--scale 0\.001"):

@@ -73,6 +73,20 @@ def test_auto_keeps_the_stated_error(tmp_path) -> None:
     assert kept[-1].megabytes < rows[0].megabytes
 
 
+def test_a_reduced_house_has_the_episodes_of_the_original_alone(tmp_path) -> None:
+    save_house(room(), tmp_path / "made", {"train": [{"path_id": 7}]})
+    save_house(room(), tmp_path / "small", {"val_unseen": []})
+    with Progress(disable=True) as progress:
+        for out in ("small", "made"):
+            reduce_folder(tmp_path / "made", tmp_path / out, Budget(2000), 0.01, progress)
+            (kept,) = (tmp_path / out / "episodes").iterdir()
+            assert kept.name == "train.json"
+        (tmp_path / "notes.txt").write_text("kept")
+        with pytest.raises(InputError, match="other files"):
+            reduce_folder(tmp_path / "made", tmp_path, Budget(2000), 0.01, progress)
+    assert (tmp_path / "notes.txt").exists()
+
+
 def test_budgets() -> None:
     assert parse_budget("auto") is None
     assert parse_budget("5000") == Budget(5000)
