@@ -85,7 +85,7 @@ def evaluate(
     record: Annotated[
         bool, typer.Option("--record", help="With --house: store the rates with the weights.")
     ] = False,
-    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 16,
+    spp: Annotated[int, typer.Option(min=1, help="Samples per pixel, a square.")] = 16,
     seed: Annotated[int, typer.Option()] = 1,
     as_json: AsJson = False,
 ) -> None:

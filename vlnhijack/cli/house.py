@@ -22,7 +22,7 @@ def make(
     seed: Annotated[int, typer.Option(help="The same seed makes the same house.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder; scenes/<name> by default.")] = None,
     lit: Annotated[bool, typer.Option("--lit", help="Keep lights instead of baking them.")] = False,
-    spp: Annotated[int, typer.Option(help="Light paths per texel of a baked house.")] = 64,
+    spp: Annotated[int, typer.Option(min=1, help="Light paths per texel, if baked.")] = 64,
     unseen: Annotated[
         bool, typer.Option("--unseen", help="Make val_unseen episodes instead of train/val_seen.")
     ] = False,
