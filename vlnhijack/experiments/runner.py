@@ -167,8 +167,9 @@ def _attacks_table(attacks: dict[str, dict[str, Any]]) -> Table:
         table.add_column(column, justify="left" if column == "attack" else "right", overflow="fold")
     for name, row in attacks.items():
         others = f"{row['loss_other_rays']:.3f} ± {row['deviation']:.3f}"
-        gap = f"{100 * row['gap']:.1f}"
-        table.add_row(name, f"{row['seconds']:.0f}", f"{row['loss_own_rays']:.3f}", others, gap)
+        own = "–" if row["loss_own_rays"] is None else f"{row['loss_own_rays']:.3f}"
+        gap = "–" if row["gap"] is None else f"{100 * row['gap']:.1f}"
+        table.add_row(name, f"{row['seconds']:.0f}", own, others, gap)
     return table
 
 
