@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -127,11 +127,21 @@ def make_instances(context: Context) -> list[AttackInstance]:
     """The experiment's instances: picked by hand, drawn by the seed, or read from a file."""
     wanted, rules, seed = context.config.instances, context.config.rules, context.config.seed
     if isinstance(wanted, list):
-        return [pick(context.scans[picked.house], picked, rules, seed) for picked in wanted]
+        return [pick(context.scan_of(picked.house), picked, rules, seed) for picked in wanted]
     if isinstance(wanted, StoredInstances):
-        return load_instances(Path(wanted.file))
+        return stored_instances(Path(wanted.file), context.houses.keys())
     scans = list(context.scans.values())
     return draw(scans, wanted.kind, wanted.count, rules, seed)
+
+
+def stored_instances(file: Path, houses: Collection[str]) -> list[AttackInstance]:
+    """The attacks of the file; InputError where a scan is none of the houses that were loaded."""
+    instances = load_instances(file)
+    for scan in used_scans(instances):
+        if scan not in houses:
+            expected = f"the name of a house ({', '.join(houses)})"
+            raise InputError(file=file, field="scan", expected=expected, received=scan)
+    return instances
 
 
 def with_attackable(context: Context, instances: Sequence[AttackInstance]) -> Context:
