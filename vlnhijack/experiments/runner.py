@@ -48,9 +48,9 @@ def run(
     context = load_context(config, folder, progress)
     instances = make_instances(context)
     context = with_attackable(context, instances)
-    open_folder(config, folder, resume=resume)
-    write_json(folder / "instances.json", [asdict(instance) for instance in instances])
     attacks = make_attacks(config, folder, instances)
+    open_folder(config, folder, resume=resume)
+    keep_start(folder, instances, context.inputs)
     seconds = {"baseline": sum(baseline(context, scan) for scan in used_scans(instances))}
     seconds |= {"attack": 0.0, "overfitting": 0.0, "evaluation": 0.0}
     frames, reports = [], {}
@@ -110,6 +110,35 @@ def check_same_settings(saved: Path, config: ExperimentConfig) -> None:
     for key in here:
         if here[key] != there[key]:
             raise InputError(file=saved, field=key, expected=here[key], received=there[key])
+
+
+def keep_start(
+    folder: Path, instances: Sequence[AttackInstance], inputs: dict[str, dict[str, str]]
+) -> None:
+    """Write what the run begins with, or check that it is what was written then.
+
+    inputs: see `Context.inputs`. Raises InputError that names what is not the same.
+    """
+    file = folder / "inputs.json"
+    known = _kept(file, inputs)
+    changed = {
+        path
+        for scan, hashes in inputs.items()
+        for path, digest in hashes.items()
+        if known.get(scan, {}).get(path) != digest
+    }
+    if changed:
+        raise InputError(f"changed since the run began: {', '.join(sorted(changed))}", file=file)
+    file, rows = folder / "instances.json", [asdict(instance) for instance in instances]
+    if _kept(file, rows) != json.loads(json.dumps(rows)):
+        raise InputError("other instances than the run began with", file=file)
+
+
+def _kept(file: Path, value: Any) -> Any:
+    """What the JSON file holds; `value` is written where there is none."""
+    if not file.exists():
+        write_json(file, value)
+    return read_json(file)
 
 
 def environment(config: ExperimentConfig) -> dict[str, Any]:
