@@ -23,8 +23,6 @@ from vlnhijack.experiments.bench.paper_scale import (
     Scale,
     paper_scale,
 )
-from vlnhijack.scenes.house import House
-from vlnhijack.scenes.house_files import load_house
 from vlnhijack.settings import house_folder
 
 SMALL = Scale(batch=3, width=32, height=24, spp=1)
@@ -42,13 +40,8 @@ TINY = Preset(VitConfig((8, 8), 4, 8, 1, 2), POLICY, mean=9, deviation=4, longes
 
 
 @pytest.fixture(scope="module")
-def house() -> House:
-    return load_house(house_folder("alder"))
-
-
-@pytest.fixture(scope="module")
-def scale(house: House) -> PaperScale:
-    return paper_scale(TINY, house, 0, SMALL)
+def scale() -> PaperScale:
+    return paper_scale(TINY, house_folder("alder"), 0, SMALL)
 
 
 def test_eighteen_views_of_three_viewpoints_and_five_steps(scale: PaperScale) -> None:
@@ -73,9 +66,7 @@ def test_the_batch_is_its_episodes_one_by_one(scale: PaperScale) -> None:
     assert gradient.any()
 
 
-def test_the_figures_are_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, house: House
-) -> None:
+def test_the_figures_are_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(PRESETS, "r2r", TINY)
     monkeypatch.setattr(module, "paper_scale", partial(paper_scale, scale=SMALL))
     monkeypatch.setattr(
@@ -110,6 +101,6 @@ def test_full_size_agents_multiply_in_bfloat16_by_default(preset: Preset) -> Non
     assert precisions(TINY) == [("float32", "float32")]
 
 
-def test_a_house_without_such_a_place_is_refused(house: House) -> None:
+def test_a_house_without_such_a_place_is_refused() -> None:
     with pytest.raises(InputError, match="30 views of each of 3 viewpoints"):
-        paper_scale(TINY, house, 0, Scale(batch=3, views=30))
+        paper_scale(TINY, house_folder("alder"), 0, Scale(batch=3, views=30))

@@ -83,7 +83,8 @@ def test_the_converted_agent_reads_and_sees_the_same(own: Path, small: Agent) ->
     for ours, theirs in ((found.policy, small.policy), (found.encoder, small.encoder)):
         for name, tensor in theirs.state_dict().items():
             assert torch.equal(ours.state_dict()[name], tensor), name
-    episodes = episodes_of(load_house(house_folder(HOUSE)), "val_seen")
+    folder = house_folder(HOUSE)
+    episodes = episodes_of(load_house(folder), folder, "val_seen")
     for ours, theirs in zip(found.reader(episodes), small.reader(episodes), strict=True):
         assert torch.equal(ours, theirs)
 

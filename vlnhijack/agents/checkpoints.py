@@ -42,11 +42,12 @@ class Agent:
     def __post_init__(self) -> None:
         config = self.policy.config
         size = config.image_feat_size if self.vision is None else self.vision.feature_size
-        known = config.max_position_embeddings
+        known, moves = config.max_position_embeddings, config.max_action_steps
         for field, fits, expected, received in (
             ("image_feat_size", config.image_feat_size == size, size, config.image_feat_size),
             ("angle_feat_size", config.angle_feat_size == _ANGLES, _ANGLES, config.angle_feat_size),
             ("max_tokens", self.reader.max_tokens <= known, f"≤ {known}", self.reader.max_tokens),
+            ("max_steps", self.max_steps <= moves, f"≤ {moves}", self.max_steps),
         ):
             if not fits:
                 raise InputError(file=self.path, field=field, expected=expected, received=received)

@@ -1,7 +1,7 @@
 """Optimise the texture of one object (paper, section 3.1)."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -114,9 +114,6 @@ class Validation(NamedTuple):
     iteration: int
     ndtw: float
     loss: float
-
-
-Validate = Callable[[Tensor, int], Validation]
 
 
 def best(checkpoints: list[Validation]) -> Validation:

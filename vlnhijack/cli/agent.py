@@ -85,14 +85,17 @@ def evaluate(
     record: Annotated[
         bool, typer.Option("--record", help="With --house: store the rates with the weights.")
     ] = False,
-    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 16,
+    spp: Annotated[int, typer.Option(min=1, help="Samples per pixel, a square.")] = 16,
     seed: Annotated[int, typer.Option()] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Measure the clean agent on freshly rendered views: of the houses of its training, with the
     ablations, or of others."""
+    from vlnhijack.errors import InputError
     from vlnhijack.experiments.agent_eval import Rendering, evaluate_agent, evaluate_in_houses
 
+    if record and not house:
+        raise InputError(field="record", expected="a --house to record", received="none")
     rendering = Rendering(spp, seed)
     with progress_bars() as progress:
         if house:

@@ -34,11 +34,10 @@ def attack(
     from vlnhijack.experiments.bench.costs import machine
     from vlnhijack.experiments.bench.paper_scale import PRESETS, paper_scale
     from vlnhijack.experiments.runner import make_repeatable
-    from vlnhijack.scenes.house_files import load_house
     from vlnhijack.settings import house_folder
 
     make_repeatable(threads)
-    scale = paper_scale(PRESETS[preset.value], load_house(house_folder(house)), seed)
+    scale = paper_scale(PRESETS[preset.value], house_folder(house), seed)
     with progress_bars() as progress:
         cost = bench_attack(scale, progress)
     settings = {"preset": preset.value, "house": house, "seed": seed, "threads": threads}

@@ -22,7 +22,7 @@ def make(
     seed: Annotated[int, typer.Option(help="The same seed makes the same house.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder; scenes/<name> by default.")] = None,
     lit: Annotated[bool, typer.Option("--lit", help="Keep lights instead of baking them.")] = False,
-    spp: Annotated[int, typer.Option(help="Light paths per texel of a baked house.")] = 64,
+    spp: Annotated[int, typer.Option(min=1, help="Light paths per texel, if baked.")] = 64,
     unseen: Annotated[
         bool, typer.Option("--unseen", help="Make val_unseen episodes instead of train/val_seen.")
     ] = False,
@@ -94,8 +94,9 @@ def reduce(
     from vlnhijack.settings import house_folder
 
     wanted, folder = parse_budget(budget), house_folder(house)
+    out = out or folder
     with progress_bars() as progress:
-        rows = reduce_folder(folder, out or folder, wanted, max_error, progress)
+        rows, kept = reduce_folder(folder, out, wanted, max_error, progress)
     table = Table(title=f"{house}, the original first")
     for column in ("faces", "texels", "MB", "seconds", "RMSE"):
         table.add_column(column, justify="right")
@@ -103,6 +104,9 @@ def reduce(
         numbers = (f"{row.megabytes:.1f}", f"{row.seconds:.2f}", f"{row.rmse:.4f}")
         table.add_row(str(row.faces), str(row.texels), *numbers)
     console.print(table)
+    console.print(f"kept: {kept.faces} faces, {kept.texels} texels; written: {out}")
+    if wanted is not None and wanted.faces is not None and kept.faces > wanted.faces:
+        console.print(f"{wanted.faces} faces were asked for: borders and charts leave no fewer")
 
 
 @app.command()

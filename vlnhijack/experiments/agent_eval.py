@@ -10,13 +10,13 @@ from rich.progress import Progress
 from torch import Tensor
 
 from vlnhijack import seeds
-from vlnhijack.agents.checkpoints import Agent, load_agent, record_metadata
+from vlnhijack.agents.checkpoints import Agent, load_agent, read_description, record_metadata
 from vlnhijack.agents.features import read_features
 from vlnhijack.agents.observation import observation_table
 from vlnhijack.errors import InputError
 from vlnhijack.evaluation.ablations import rates
 from vlnhijack.evaluation.evaluate import Rates, mean_scores, navigate
-from vlnhijack.experiments.context import agent_file, episodes_of
+from vlnhijack.experiments.context import agent_file, episodes_of, load_houses
 from vlnhijack.experiments.train_agent import AgentConfig, measure, what_it_sees
 from vlnhijack.experiments.views import encode_house
 from vlnhijack.navigation.episode import by_scan, stream_episodes
@@ -80,14 +80,13 @@ def evaluate_in_houses(
     """
     agent = load_agent(agent_file(name))
     found: dict[str, Rates] = {}
-    for folder in houses:
-        house = load_house(house_folder(folder))
-        episodes = episodes_of(house, "val_seen")
+    for folder, house in load_houses(houses).items():
+        episodes = episodes_of(house, folder, "val_seen")
         agent.reader(episodes)
         features = _encode(agent, house, rendering, progress)
         found[house.name] = rates(agent, observation_table([house.graph]), features, episodes)
     if record:
-        known = agent.metadata.get("val_seen_by_house", {})
+        known = read_description(agent.path).metadata.get("val_seen_by_house", {})
         record_metadata(agent.path, {"val_seen_by_house": known | found})
     return found
 

@@ -1,13 +1,18 @@
 """The attacks of an experiment: every instance with every rendering, each in its own folder."""
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from vlnhijack.artifacts import read_rows
 from vlnhijack.attack.optimise import Validation, best
+from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import ExperimentConfig, RenderSettings
 from vlnhijack.threat import AttackInstance
+
+_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +63,21 @@ class Attack:
 def make_attacks(
     config: ExperimentConfig, folder: Path, instances: Sequence[AttackInstance]
 ) -> list[Attack]:
-    """Their ids are those of the instances, with the rendering's name where it is one of a list."""
+    """Their ids are those of the instances, with the rendering's name where it is one of a list.
+
+    Raises InputError where they cannot name folders of their own.
+    """
     listed = isinstance(config.rendering, list)
-    return [
-        Attack(
-            instance,
-            rendering,
-            folder / "attacks" / (f"{instance.id}-{rendering.name}" if listed else instance.id),
-        )
+    made = [
+        (f"{instance.id}-{rendering.name}" if listed else instance.id, instance, rendering)
         for instance in instances
         for rendering in config.renderings
+    ]
+    times = Counter(name for name, _, _ in made)
+    wrong = [name for name in times if times[name] > 1 or not _ID.fullmatch(name)]
+    if wrong:
+        expected = "distinct ids of letters, digits, _ . and -"
+        raise InputError(field="instances", expected=expected, received=wrong)
+    return [
+        Attack(instance, rendering, folder / "attacks" / name) for name, instance, rendering in made
     ]

@@ -7,12 +7,12 @@ import torch
 from torch import Tensor
 
 from vlnhijack.agents.features import Features, cached_features
-from vlnhijack.artifacts import read_json, sha256, write_json
+from vlnhijack.artifacts import read_json, write_json
 from vlnhijack.evaluation.evaluate import navigate
 from vlnhijack.evaluation.gate import check_baseline
 from vlnhijack.experiments.context import Context, recorded_rate
 from vlnhijack.experiments.views import encode_house
-from vlnhijack.settings import house_folder
+from vlnhijack.rendering.variant import activate
 
 
 def clean_features(context: Context, scan: str) -> Tensor:
@@ -41,8 +41,10 @@ def clean_features(context: Context, scan: str) -> Tensor:
 
 def made_by(context: Context, scan: str, spp: int, seed: int) -> str:
     """What the features of a clean house's views hang on."""
-    agent, house = sha256(context.agent.path), sha256(house_folder(scan) / "house.json")
-    return f"agent {agent}, house {house}, {spp} spp, seed {seed}"
+    hashes = ", ".join(f"{file} {digest}" for file, digest in context.inputs[scan].items())
+    height, width = context.agent.encoder.image_size
+    variant = activate().variant()
+    return f"{hashes}, {width} × {height}, {variant}, {spp} spp, seed {seed}"
 
 
 def baseline(context: Context, scan: str) -> float:
@@ -55,7 +57,7 @@ def baseline(context: Context, scan: str) -> float:
     episodes = context.scans[scan].val_seen
     scores = navigate(context.agent, context.table, features, episodes)
     successes = int(sum(score.success for score in scores))
-    recorded = recorded_rate(context.agent, scan)
+    recorded = recorded_rate(context.agent, scan, context.folders[scan])
     check_baseline(scan, successes, len(episodes), recorded)
     seconds = time.perf_counter() - started
     write_json(

@@ -20,6 +20,7 @@ CATEGORIES = ("chair", "cabinet", "table", "plant", "sofa", "tv_monitor")
 Kind = Literal["single_step", "trajectory"]
 Rung = Literal["frozen", "fixed-illumination", "prb"]
 Share = Annotated[float, Field(ge=0, le=1)]
+Beta = Annotated[float, Field(ge=0, lt=1)]
 
 
 class PickedInstance(Settings):
@@ -146,7 +147,7 @@ class AttackSettings(Settings):
     batch: PositiveInt = 16
     epsilon: Annotated[float, Field(gt=0, le=1)] = 0.3
     lr: PositiveFloat = 0.01
-    betas: tuple[Share, Share] = (0.9, 0.999)
+    betas: tuple[Beta, Beta] = (0.9, 0.999)
     checkpoint_every: PositiveInt = 30
     rendered_viewpoints: PositiveInt = 3
 

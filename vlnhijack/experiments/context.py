@@ -1,6 +1,6 @@
 """What every stage of a run shares."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,6 +15,7 @@ from vlnhijack import seeds
 from vlnhijack.agents.checkpoints import Agent, load_agent
 from vlnhijack.agents.observation import ObservationTable, observation_table
 from vlnhijack.agents.precision import default_precision, set_precision
+from vlnhijack.artifacts import sha256
 from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import (
     DrawnInstances,
@@ -29,18 +30,22 @@ from vlnhijack.experiments.views import coverage_table
 from vlnhijack.navigation.episode import Episode, load_episodes
 from vlnhijack.scenes.house import House
 from vlnhijack.scenes.house_files import load_house
-from vlnhijack.settings import WEIGHTS, house_folder
+from vlnhijack.settings import WEIGHTS, house_folder, scenes_folder
 
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """An experiment's agent and houses, loaded once, and its run folder."""
+    """An experiment's agent and houses, loaded once, and its run folder.
+
+    houses and folders: each house and its folder, by the name of the house.
+    """
 
     config: ExperimentConfig
     folder: Path
     progress: Progress
     agent: Agent
     houses: dict[str, House]
+    folders: dict[str, Path]
 
     @cached_property
     def table(self) -> ObservationTable:
@@ -54,6 +59,19 @@ class Context:
         set_precision(encoder, wanted.vision or default_precision(encoder.feature_size))
         set_precision(policy, wanted.policy or default_precision(policy.config.hidden_size))
         return replace(self.agent, vision=encoder, policy=policy)
+
+    @cached_property
+    def inputs(self) -> dict[str, dict[str, str]]:
+        """SHA-256 of the files that the clean views of every house hang on."""
+        agent = {self.agent.path.name: sha256(self.agent.path)}
+        return {
+            name: agent
+            | {
+                f"{name}/{file}": sha256(folder / file)
+                for file in ("house.json", f"{name}_connectivity.json")
+            }
+            for name, folder in self.folders.items()
+        }
 
     def rows(self, scan: str) -> slice:
         """Rows of a scan's viewpoints in the table and in feature tensors."""
@@ -78,11 +96,16 @@ class Context:
             name: Scan(
                 graph=house.graph,
                 places=rendered_places(house, self.coverage[name]),
-                train=episodes_of(house, "train"),
-                val_seen=episodes_of(house, "val_seen"),
+                train=episodes_of(house, self.folders[name], "train"),
+                val_seen=episodes_of(house, self.folders[name], "val_seen"),
             )
             for name, house in self.houses.items()
         }
+
+    def scan_of(self, house: str) -> Scan:
+        """What decides the instances of a house of the experiment, given by its name or path."""
+        wanted = house_folder(house)
+        return next(self.scans[name] for name, path in self.folders.items() if path == wanted)
 
     def place(self, features: Tensor, scan: str) -> Tensor:
         """Features (M,36,D) of one scan in a tensor of all viewpoints of the table."""
@@ -94,20 +117,33 @@ class Context:
 def load_context(config: ExperimentConfig, folder: Path, progress: Progress) -> Context:
     """Load the agent and the houses that the experiment names.
 
-    Raises InputError where the agent has no recorded rate in a house or cannot read its episodes.
+    Raises InputError where the agent has no recorded rate in a house or cannot read its episodes,
+    or where two houses have the same name.
     """
-    houses = {name: load_house(house_folder(name)) for name in house_list(config.instances)}
+    found = load_houses(house_list(config.instances))
     agent = load_agent(agent_file(config.agent))
-    for house in houses.values():
-        recorded_rate(agent, house.name)
-        agent.reader(episodes_of(house, "val_seen"))
-    return Context(config, folder, progress, agent, houses)
+    for path, house in found.items():
+        recorded_rate(agent, house.name, path)
+        agent.reader(episodes_of(house, path, "val_seen"))
+    houses = {house.name: house for house in found.values()}
+    folders = {house.name: path for path, house in found.items()}
+    return Context(config, folder, progress, agent, houses, folders)
 
 
-def recorded_rate(agent: Agent, scan: str) -> float:
+def load_houses(wanted: Iterable[str]) -> dict[Path, House]:
+    """Houses given by name or path, by their folders; InputError where two have the same name."""
+    houses = {path: load_house(path) for path in dict.fromkeys(map(house_folder, wanted))}
+    if len({house.name for house in houses.values()}) < len(houses):
+        received = ", ".join(f"{house.name} in {path}" for path, house in houses.items())
+        raise InputError(field="house", expected="houses of different names", received=received)
+    return houses
+
+
+def recorded_rate(agent: Agent, scan: str, folder: Path) -> float:
     """The clean success rate on val_seen of a house that is stored with the agent's weights."""
     known = agent.metadata.get("val_seen_by_house", {})
-    command = f"vlnhijack agent eval {agent.path} --house {scan} --record"
+    house = scan if folder == scenes_folder() / scan else folder
+    command = f"vlnhijack agent eval {agent.path} --house {house} --record"
     if scan not in known:
         raise InputError(
             file=agent.path.with_suffix(".json"),
@@ -132,7 +168,6 @@ def agent_file(name: str) -> Path:
     return Path(name) if name.endswith(".safetensors") else WEIGHTS / f"{name}.safetensors"
 
 
-def episodes_of(house: House, split: str) -> Sequence[Episode]:
-    """Episodes of a split ("train", "val_seen", "val_unseen") of a house of the data root."""
-    file = house_folder(house.name) / "episodes" / f"{split}.json"
-    return load_episodes(file, {house.name: house.graph})
+def episodes_of(house: House, folder: Path, split: str) -> Sequence[Episode]:
+    """Episodes of a split ("train", "val_seen", "val_unseen") of the house in `folder`."""
+    return load_episodes(folder / "episodes" / f"{split}.json", {house.name: house.graph})

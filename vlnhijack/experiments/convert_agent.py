@@ -68,7 +68,7 @@ def convert_agent(
         reader,
         metadata,
         out,
-        settings.max_steps or steps,
+        settings.max_steps or min(steps, config.max_action_steps),
     )
     save_agent(agent)
     return agent

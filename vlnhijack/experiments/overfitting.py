@@ -22,39 +22,45 @@ def overfitting(context: Context, attack: Attack) -> dict[str, Any]:
     """Loss of a finished attack at its own camera rays and at others; measured once.
 
     Of the exported texture, over all training episodes, by the rung and samples per pixel of the
-    attack; the light of a rung that renews it is that around the texture. See `loss_gap`.
+    attack; the light of a rung that renews it is that around the texture. `prb` draws other rays in
+    every iteration, so that it has none of its own. See `loss_gap`.
     """
     if attack.overfitting.exists():
         return read_json(attack.overfitting)
     started = time.perf_counter()
-    seeds = [
+    own, *others = (
         context.seed("views", stream, attack.instance.id)
         for stream in ("attack", *(f"overfitting {k}" for k in range(_SEEDS)))
-    ]
-    found = loss_gap(_loss(context, attack), *seeds)
+    )
+    has_own = attack.rendering.rung != "prb"
+    found = loss_gap(_loss(context, attack, own), own if has_own else None, *others)
     report = {**found, "seconds": time.perf_counter() - started}
     write_json(attack.overfitting, report)
     return report
 
 
-def loss_gap(loss: Callable[[int], float], own: int, *others: int) -> dict[str, float]:
+def loss_gap(
+    loss: Callable[[int], float], own: int | None, *others: int
+) -> dict[str, float | None]:
     """What the loss at the seed `own` understates.
 
     loss_own_rays; loss_other_rays and deviation: mean and standard deviation over the other seeds;
-    gap: the difference as a share of loss_own_rays (at least _LEAST nats).
+    gap: the difference as a share of loss_own_rays (at least _LEAST nats). Without a seed of its
+    own, loss_own_rays and gap are None.
     """
-    at_own = loss(own)
+    at_own = None if own is None else loss(own)
     elsewhere = [loss(seed) for seed in others]
     mean = float(np.mean(elsewhere))
     return {
         "loss_own_rays": at_own,
         "loss_other_rays": mean,
         "deviation": float(np.std(elsewhere, ddof=1)),
-        "gap": (mean - at_own) / max(at_own, _LEAST),
+        "gap": None if at_own is None else (mean - at_own) / max(at_own, _LEAST),
     }
 
 
-def _loss(context: Context, attack: Attack) -> Callable[[int], float]:
+def _loss(context: Context, attack: Attack, own: int) -> Callable[[int], float]:
+    """The loss at the camera rays of a seed; the attack's renderer has those of `own`."""
     instance, settings = attack.instance, attack.rendering
     exported = exported_texture(context, attack)
     views, objective = training(context, attack)
@@ -64,8 +70,9 @@ def _loss(context: Context, attack: Attack) -> Callable[[int], float]:
 
     @torch.no_grad()
     def loss(seed: int) -> float:
-        cameras = views.renderer.cameras
-        renderer = attack_renderer(settings, house, instance.object_id, cameras, seed)
+        renderer = views.renderer
+        if seed != own or settings.refresh_every:
+            renderer = attack_renderer(settings, house, instance.object_id, renderer.cameras, seed)
         features = replace(views, renderer=renderer).features(torch.from_numpy(exported))
         return objective(features, torch.arange(len(objective.first))).mean().item()
 

@@ -56,20 +56,26 @@ def parse_budget(text: str) -> Budget | None:
 
 def reduce_folder(
     folder: Path, out: Path, budget: Budget | None, max_error: float, progress: Progress
-) -> list[Measured]:
-    """Write the reduced house to `out`; the original and every reduction that was tried.
+) -> tuple[list[Measured], Measured]:
+    """Write the reduced house to `out`; the original and every reduction that was tried, and the
+    one that was kept.
 
     Without a budget, the smallest that keeps the RMSE of the compared views at or below max_error:
-    first of faces, then of texels, each halved as long as that holds.
+    first of faces, then of texels, each halved as long as that holds. Raises InputError where
+    max_error is not positive.
     """
+    if not max_error > 0:
+        raise InputError(field="max-error", expected="a positive RMSE", received=max_error)
     require_replaceable(out, HOUSE_FILE)
     house = load_house(folder)
     task = progress.add_task(f"{house.name}: the original", total=None)
     views = _Views(house)
     rows = [views.measure(house)]
+    kept = rows[0]
     if budget is not None:
         reduced = _reduced(house, budget)
-        rows.append(views.measure(reduced))
+        kept = views.measure(reduced)
+        rows.append(kept)
     else:
         reduced = house
         for step in _halved_faces, _halved_texels:
@@ -79,9 +85,9 @@ def reduce_folder(
                 progress.update(task, description=f"{house.name}: RMSE {measured.rmse:.4f}")
                 if measured.rmse > max_error:
                     break
-                reduced = smaller
+                reduced, kept = smaller, measured
     save_house(reduced, out, None if out.resolve() == folder.resolve() else _episodes(folder))
-    return rows
+    return rows, kept
 
 
 def _episodes(folder: Path) -> dict[str, list[dict[str, Any]]]:

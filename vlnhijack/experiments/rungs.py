@@ -1,7 +1,9 @@
 """The renderers of an experiment: the rung of the ladder that it names, and the unbiased one."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import product
 
+from vlnhijack.errors import InputError
 from vlnhijack.experiments.config import RenderSettings
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.fixed_illumination import FixedIlluminationRenderer
@@ -9,6 +11,18 @@ from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.house import House
+
+
+def require_rungs(renderings: Sequence[RenderSettings], houses: Iterable[House]) -> None:
+    """InputError where a rung is not for the kind of a house."""
+    suits = {"frozen": "baked", "fixed-illumination": "lit"}
+    for house, settings in product(houses, renderings):
+        if suits.get(settings.rung, house.kind) != house.kind:
+            raise InputError(
+                field="rendering.rung",
+                expected=f"a rung for the {house.kind} house {house.name}",
+                received=settings.rung,
+            )
 
 
 def attack_renderer(

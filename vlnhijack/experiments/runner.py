@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -29,6 +29,7 @@ from vlnhijack.experiments.instances.files import load_instances
 from vlnhijack.experiments.instances.houses import draw, pick
 from vlnhijack.experiments.overfitting import overfitting
 from vlnhijack.experiments.pictures import illustrate
+from vlnhijack.experiments.rungs import require_rungs
 from vlnhijack.experiments.yaml_config import load_config, save_config
 from vlnhijack.scenes.importing.unwrapping import unwrapped
 from vlnhijack.threat import AttackInstance
@@ -46,11 +47,12 @@ def run(
     """
     make_repeatable(config.threads)
     context = load_context(config, folder, progress)
+    require_rungs(config.renderings, context.houses.values())
     instances = make_instances(context)
     context = with_attackable(context, instances)
-    open_folder(config, folder, resume=resume)
-    write_json(folder / "instances.json", [asdict(instance) for instance in instances])
     attacks = make_attacks(config, folder, instances)
+    open_folder(config, folder, resume=resume)
+    keep_start(folder, instances, context.inputs)
     seconds = {"baseline": sum(baseline(context, scan) for scan in used_scans(instances))}
     seconds |= {"attack": 0.0, "overfitting": 0.0, "evaluation": 0.0}
     frames, reports = [], {}
@@ -112,6 +114,35 @@ def check_same_settings(saved: Path, config: ExperimentConfig) -> None:
             raise InputError(file=saved, field=key, expected=here[key], received=there[key])
 
 
+def keep_start(
+    folder: Path, instances: Sequence[AttackInstance], inputs: dict[str, dict[str, str]]
+) -> None:
+    """Write what the run begins with, or check that it is what was written then.
+
+    inputs: see `Context.inputs`. Raises InputError that names what is not the same.
+    """
+    file = folder / "inputs.json"
+    known = _kept(file, inputs)
+    changed = {
+        path
+        for scan, hashes in inputs.items()
+        for path, digest in hashes.items()
+        if known.get(scan, {}).get(path) != digest
+    }
+    if changed:
+        raise InputError(f"changed since the run began: {', '.join(sorted(changed))}", file=file)
+    file, rows = folder / "instances.json", [asdict(instance) for instance in instances]
+    if _kept(file, rows) != json.loads(json.dumps(rows)):
+        raise InputError("other instances than the run began with", file=file)
+
+
+def _kept(file: Path, value: Any) -> Any:
+    """What the JSON file holds; `value` is written where there is none."""
+    if not file.exists():
+        write_json(file, value)
+    return read_json(file)
+
+
 def environment(config: ExperimentConfig) -> dict[str, Any]:
     """Versions, machine, threads and seed: what the numbers hang on."""
     return {
@@ -127,11 +158,21 @@ def make_instances(context: Context) -> list[AttackInstance]:
     """The experiment's instances: picked by hand, drawn by the seed, or read from a file."""
     wanted, rules, seed = context.config.instances, context.config.rules, context.config.seed
     if isinstance(wanted, list):
-        return [pick(context.scans[picked.house], picked, rules, seed) for picked in wanted]
+        return [pick(context.scan_of(picked.house), picked, rules, seed) for picked in wanted]
     if isinstance(wanted, StoredInstances):
-        return load_instances(Path(wanted.file))
+        return stored_instances(Path(wanted.file), context.houses.keys())
     scans = list(context.scans.values())
     return draw(scans, wanted.kind, wanted.count, rules, seed)
+
+
+def stored_instances(file: Path, houses: Collection[str]) -> list[AttackInstance]:
+    """The attacks of the file; InputError where a scan is none of the houses that were loaded."""
+    instances = load_instances(file)
+    for scan in used_scans(instances):
+        if scan not in houses:
+            expected = f"the name of a house ({', '.join(houses)})"
+            raise InputError(file=file, field="scan", expected=expected, received=scan)
+    return instances
 
 
 def with_attackable(context: Context, instances: Sequence[AttackInstance]) -> Context:
@@ -167,8 +208,9 @@ def _attacks_table(attacks: dict[str, dict[str, Any]]) -> Table:
         table.add_column(column, justify="left" if column == "attack" else "right", overflow="fold")
     for name, row in attacks.items():
         others = f"{row['loss_other_rays']:.3f} ± {row['deviation']:.3f}"
-        gap = f"{100 * row['gap']:.1f}"
-        table.add_row(name, f"{row['seconds']:.0f}", f"{row['loss_own_rays']:.3f}", others, gap)
+        own = "–" if row["loss_own_rays"] is None else f"{row['loss_own_rays']:.3f}"
+        gap = "–" if row["gap"] is None else f"{100 * row['gap']:.1f}"
+        table.add_row(name, f"{row['seconds']:.0f}", own, others, gap)
     return table
 
 

@@ -23,9 +23,9 @@ SquareInt = Annotated[PositiveInt, AfterValidator(_square)]
 
 
 class Settings(BaseModel):
-    """A frozen group of settings; keys that are not its own are refused."""
+    """A frozen group of settings; keys that are not its own and infinities are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 Config = TypeVar("Config", bound=Settings)

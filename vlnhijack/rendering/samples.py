@@ -45,9 +45,9 @@ def views_sensor(cameras: Sequence[Camera], spp: int, film: Film = "box") -> Any
     """A Mitsuba sensor of V cameras: float32 film (V·(height + 2·border), width + 2·border).
 
     `sensor.aim(cameras)` points it at as many other cameras of the same size. Raises InputError
-    where spp is no square number, as the stratified sampler needs.
+    where spp is no positive square number, as the stratified sampler needs.
     """
-    if isqrt(spp) ** 2 != spp:
+    if spp < 1 or isqrt(spp) ** 2 != spp:
         raise InputError(field="spp", expected="a square number", received=spp)
     width, height = image_size(cameras)
     mi = activate()

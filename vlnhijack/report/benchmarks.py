@@ -29,7 +29,7 @@ def pareto(path: Path, rows: Rows, title: str) -> None:
         _curves(left, rows, lambda row: row["rmse"], "image RMSE, display values")
         _curves(right, rows, lambda row: 1 - row["grad_cosine"], "1 − cosine of the gradient")
         left.legend(loc="center")
-        figure.suptitle(title, fontsize=10)
+        figure.suptitle(f"{title}; numbers: samples per pixel", fontsize=10)
         save_figure(figure, path)
 
 
@@ -43,7 +43,7 @@ def _curves(axes: Axes, rows: Rows, error: Any, label: str) -> None:
                 str(row["spp"]), (x, y), (5, 5), textcoords="offset points", color=MUTED, fontsize=8
             )
     axes.set(xscale="log", yscale="log", ylabel=label)
-    axes.set_xlabel("image with gradient, ms (numbers: samples per pixel)")
+    axes.set_xlabel("image with gradient, ms")
     axes.grid(color="#EEEEEE")
 
 

@@ -1,7 +1,7 @@
 """Agents in our own form."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -26,7 +26,7 @@ CONFIG = HamtConfig(
     intermediate_size=16,
     max_position_embeddings=10,
     vocab_size=9,
-    max_action_steps=4,
+    max_action_steps=20,
     num_l_layers=1,
     num_x_layers=1,
     num_h_pano_layers=1,
@@ -82,6 +82,8 @@ def test_parts_that_do_not_fit_each_other_are_refused(tmp_path: Path) -> None:
         agent(tmp_path, narrow)
     with pytest.raises(InputError, match="max_tokens: expected '≤ 10', received 11|≤ 10"):
         agent(tmp_path, None, Reader(None, 9, max_tokens=11))
+    with pytest.raises(InputError, match="max_steps: expected ≤ 20, received 21|'≤ 20', rec"):
+        replace(agent(tmp_path, None), max_steps=21)
 
 
 def test_rates_are_recorded_beside_the_weights(agent_path: Path) -> None:

@@ -8,7 +8,7 @@ from vlnhijack.attack.projected_adam import ProjectedAdam
 from vlnhijack.errors import InputError
 from vlnhijack.experiments.attack_stage import _renew
 from vlnhijack.experiments.config import RenderSettings
-from vlnhijack.experiments.rungs import attack_renderer, unbiased_renderer
+from vlnhijack.experiments.rungs import attack_renderer, require_rungs, unbiased_renderer
 from vlnhijack.frames import Camera
 from vlnhijack.rendering.fixed_illumination import FixedIlluminationRenderer
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
@@ -41,6 +41,14 @@ def test_a_rung_refuses_houses_of_the_other_kind(rung: str, kind: str) -> None:
     house = tiny_house("lit" if kind == "lit" else "baked")
     with pytest.raises(InputError, match=f"kind: expected .* received {kind}|'{kind}'"):
         attack_renderer(_settings(rung), house, "cabinet_0", CAMERAS, 1)
+
+
+@pytest.mark.parametrize(("rung", "kind"), [("frozen", "lit"), ("fixed-illumination", "baked")])
+def test_an_experiment_with_the_wrong_rung_is_refused(rung: str, kind: str) -> None:
+    house = tiny_house("lit" if kind == "lit" else "baked")
+    require_rungs([_settings("prb")], [house])
+    with pytest.raises(InputError, match=f"rendering.rung: expected a rung for the {kind} house"):
+        require_rungs([_settings("prb"), _settings(rung)], [house])
 
 
 def test_light_is_renewed_after_every_so_many_iterations(monkeypatch: pytest.MonkeyPatch) -> None:

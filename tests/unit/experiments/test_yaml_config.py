@@ -70,6 +70,9 @@ def test_a_saved_config_is_the_same(tmp_path: Path, text: str) -> None:
         ("rendering: 3", "a.yaml: rendering: expected a valid dictionary"),
         ("rules: {min_paths: 1}", "a.yaml: rules.min_paths: expected greater than or equal to 2"),
         ("rules: {validation: 0}", "a.yaml: rules.validation: expected greater than 0, received 0"),
+        ("rules: {target_distance: .inf}", "a.yaml: rules.target_distance: expected a finite n"),
+        ("rules: {validation: .nan}", "a.yaml: rules.validation: expected a finite number"),
+        ("rendering: {max_memory: .inf}", "a.yaml: rendering.max_memory: expected a finite numb"),
         ("rendering: {rung: maya}", "a.yaml: rendering.rung: expected 'frozen', 'fixed-"),
     ],
 )
@@ -187,6 +190,8 @@ def test_overrides_replace_single_values(tmp_path: Path) -> None:
         ("name.first=3", "--set: expected keys of nested settings, received 'name.first'"),
         ("seed=[", "--set seed: expected a YAML value, received '['"),
         ("attack.speed=3", "a.yaml: attack.speed: expected no such key, received 3"),
+        ("attack.betas=[0.9, 1]", "a.yaml: attack.betas.1: expected less than 1, received 1"),
+        ("attack.lr=.inf", "a.yaml: attack.lr: expected a finite number, received inf"),
     ],
 )
 def test_bad_overrides_are_named(tmp_path: Path, override: str, expected: str) -> None:

@@ -28,6 +28,7 @@ from vlnhijack.navigation.views import VIEWS, panorama_cameras
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.renderer import Renderer
 from vlnhijack.scenes.house import House
+from vlnhijack.scenes.house_files import load_house
 from vlnhijack.scenes.uv_atlas import used_texels
 from vlnhijack.threat import AttackInstance
 
@@ -125,14 +126,16 @@ def _vision(config: VitConfig | ClipConfig) -> VisionTransformer | ClipVisual:
     return ClipVisual(config) if isinstance(config, ClipConfig) else VisionTransformer(config)
 
 
-def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale()) -> PaperScale:
-    """The attack in that house whose views the object fills most.
+def paper_scale(preset: Preset, folder: Path, seed: int, scale: Scale = Scale()) -> PaperScale:
+    """The attack in the house of that folder whose views the object fills most.
 
     Raises InputError where no object is seen in so many views along a shortest path of so many
     viewpoints that starts where so many episodes pass.
     """
-    object_id, path, rows, views = _place(house, scale)
-    passing = _through(house, path[0])
+    house = load_house(folder)
+    train = episodes_of(house, folder, "train")
+    object_id, path, rows, views = _place(house, train, scale)
+    passing = _through(train, path[0])
     order = seeds.stream(seed, "paper-scale episodes").permutation(len(passing))[: scale.batch]
     category = next(item.category for item in house.objects if item.id == object_id)
     episodes = _instruct([passing[index] for index in order], preset, seed)
@@ -158,15 +161,17 @@ def paper_scale(preset: Preset, house: House, seed: int, scale: Scale = Scale())
     )
 
 
-def _through(house: House, viewpoint: str) -> Sequence[Episode]:
-    return [episode for episode in episodes_of(house, "train") if viewpoint in episode.path]
+def _through(episodes: Sequence[Episode], viewpoint: str) -> list[Episode]:
+    return [episode for episode in episodes if viewpoint in episode.path]
 
 
-def _place(house: House, scale: Scale) -> tuple[str, list[str], Tensor, Tensor]:
+def _place(
+    house: House, train: Sequence[Episode], scale: Scale
+) -> tuple[str, list[str], Tensor, Tensor]:
     """Object, path, and rows and indices of the views along its start that it fills most."""
     share = coverage_table(house, *_LOOK)
     best, found = 0.0, None
-    for path in _paths(house, scale):
+    for path in _paths(house, train, scale):
         rows = [house.graph.row(viewpoint) for viewpoint in path[: scale.viewpoints]]
         filled = np.sort(share[rows], 1)[:, -scale.views :]
         total = np.where(filled.min((0, 1)) > 0, filled.sum((0, 1)), 0)
@@ -181,10 +186,10 @@ def _place(house: House, scale: Scale) -> tuple[str, list[str], Tensor, Tensor]:
     return house.objects[column].id, path, *places
 
 
-def _paths(house: House, scale: Scale) -> Iterator[list[str]]:
+def _paths(house: House, train: Sequence[Episode], scale: Scale) -> Iterator[list[str]]:
     """Shortest paths of `steps` viewpoints from wherever enough episodes pass."""
     for start in house.graph.viewpoints:
-        if len(_through(house, start)) >= scale.batch:
+        if len(_through(train, start)) >= scale.batch:
             paths = house.graph.shortest_paths(start).values()
             yield from (path for path in paths if len(path) == scale.steps)
 

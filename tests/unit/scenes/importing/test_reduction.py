@@ -66,11 +66,20 @@ def test_texels_of_shared_textures_and_atlases() -> None:
 def test_auto_keeps_the_stated_error(tmp_path) -> None:
     save_house(with_hill(room()), tmp_path / "made")
     with Progress(disable=True) as progress:
-        rows = reduce_folder(tmp_path / "made", tmp_path / "small", None, 0.01, progress)
+        rows, last = reduce_folder(tmp_path / "made", tmp_path / "small", None, 0.01, progress)
     kept = [row for row in rows if row.rmse <= 0.01]
     assert rows[0].rmse == 0
     assert face_count(load_house(tmp_path / "small")) == min(row.faces for row in kept)
     assert kept[-1].megabytes < rows[0].megabytes
+    assert last == kept[-1]
+
+
+@pytest.mark.parametrize("max_error", [0.0, -1.0, float("nan")])
+def test_an_error_that_nothing_keeps_is_refused(tmp_path, max_error: float) -> None:
+    save_house(room(), tmp_path / "made")
+    with Progress(disable=True) as progress, pytest.raises(InputError, match="max-error"):
+        reduce_folder(tmp_path / "made", tmp_path / "small", None, max_error, progress)
+    assert not (tmp_path / "small").exists()
 
 
 def test_a_reduced_house_has_the_episodes_of_the_original_alone(tmp_path) -> None:
