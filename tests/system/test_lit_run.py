@@ -63,7 +63,7 @@ def agent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def config(agent: Path) -> ExperimentConfig:
     picked = {
         "kind": "single_step",
-        "house": HOUSE.name,
+        "house": str(agent.parent / "scenes" / HOUSE.name),
         "object": "cabinet_0",
         "viewpoint": NAMES[1],
     }

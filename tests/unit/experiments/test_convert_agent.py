@@ -92,6 +92,12 @@ def test_a_converted_agent_is_the_official_one(given: World, folder: Path, tmp_p
     assert (found["layout"], found["variant"]) == ("vlnhijack agent", "r2r")
 
 
+def test_an_agent_takes_no_more_steps_than_its_policy_knows(folder: Path, tmp_path: Path) -> None:
+    done = convert(folder, tmp_path / "far.safetensors", "--set", "max_steps=31")
+    assert done.exit_code == 1
+    assert "max_steps: expected ≤ 30, received 31" in done.stderr.replace("'", "")
+
+
 def test_stored_features_measure_an_agent_without_an_encoder(
     given: World, folder: Path, tmp_path: Path
 ) -> None:
