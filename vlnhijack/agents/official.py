@@ -230,9 +230,9 @@ def _read_torch(path: Path) -> Mapping[str, Any]:
         content = torch.load(path, map_location="cpu", weights_only=True)
     except FileNotFoundError:
         raise InputError(file=path, expected="a checkpoint", received="no such file") from None
-    except Exception as error:  # torch and pickle let many kinds through on damaged files
-        reason = str(error).partition("\n")[0]
-        raise InputError(f"not a readable checkpoint ({reason})", file=path) from None
+    except Exception:  # torch and pickle let many kinds through on damaged files
+        expected, received = "a checkpoint of tensors alone", "another file, or a damaged one"
+        raise InputError(file=path, expected=expected, received=received) from None
     if not isinstance(content, Mapping):
         raise InputError(file=path, expected="a dictionary", received=type(content).__name__)
     return content
