@@ -7,6 +7,7 @@ import trimesh
 from scipy.ndimage import zoom
 
 from vlnhijack import seeds
+from vlnhijack.frames import Camera, heading_of
 from vlnhijack.navigation.graph import NavigationGraph
 from vlnhijack.scenes.house import House, HouseObject, Light, Room
 from vlnhijack.scenes.surface import Surface
@@ -38,6 +39,16 @@ def tiny_house(kind: Literal["baked", "lit"] = "baked") -> House:
         lights=(light,) if kind == "lit" else (),
         exposure=2.0 if kind == "lit" else 1.0,
     )
+
+
+def cabinet_cameras(width: int = 32, height: int = 24) -> list[Camera]:
+    """Four cameras that look at the cabinet from the viewpoints."""
+    house = tiny_house()
+    centre = np.array(house.object("cabinet_0").centre)
+    return [
+        Camera((x, y, z), float(heading_of(centre - (x, y, z))), -0.4, width, height)
+        for x, y, z in house.graph.positions.tolist()
+    ]
 
 
 def _box(centre: tuple[float, float, float], size: tuple[float, float, float]) -> trimesh.Trimesh:

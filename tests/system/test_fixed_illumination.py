@@ -7,9 +7,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from tests.houses import tiny_house
+from tests.houses import cabinet_cameras, tiny_house
 from vlnhijack.errors import InputError
-from vlnhijack.frames import Camera, heading_of
 from vlnhijack.rendering.fixed_illumination import FixedIlluminationRenderer
 from vlnhijack.rendering.light import light_at
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
@@ -21,18 +20,11 @@ OBJECT = "cabinet_0"
 SIZE = (16, 12)
 
 
-def _cameras() -> list[Camera]:
-    house = tiny_house("lit")
-    centre = np.array(house.object(OBJECT).centre)
-    return [
-        Camera((x, y, z), float(heading_of(centre - (x, y, z))), -0.4, *SIZE)
-        for x, y, z in house.graph.positions[:2].tolist()
-    ]
-
-
 @cache
 def _renderer(seed: int = 3) -> FixedIlluminationRenderer:
-    return FixedIlluminationRenderer(tiny_house("lit"), OBJECT, _cameras(), 64, seed, light_spp=16)
+    return FixedIlluminationRenderer(
+        tiny_house("lit"), OBJECT, cabinet_cameras(*SIZE)[:2], 64, seed, light_spp=16
+    )
 
 
 def _texture() -> Tensor:
@@ -46,7 +38,7 @@ def _gradient(renderer: FixedIlluminationRenderer | MitsubaRenderer) -> Tensor:
 
 def test_at_its_own_texture_it_is_the_path_traced_picture() -> None:
     shown = _renderer()(_texture())
-    expected = render_views(tiny_house("lit"), _cameras(), 400, 9)
+    expected = render_views(tiny_house("lit"), cabinet_cameras(*SIZE)[:2], 400, 9)
     assert float((shown - expected).mean().abs()) < 0.004
     assert float((shown - expected).abs().mean()) < 0.02
 
@@ -55,7 +47,7 @@ def test_rays_that_miss_the_object_are_those_of_the_views() -> None:
     renderer = _renderer()
     covered = renderer.transport(torch.ones(renderer.texture_shape)).view(2, -1, 3).sum(-1)
     shown = renderer(_texture()).flatten(2)
-    views = render_views(tiny_house("lit"), _cameras(), 64, 3).flatten(2)
+    views = render_views(tiny_house("lit"), cabinet_cameras(*SIZE)[:2], 64, 3).flatten(2)
     outside = (covered == 0)[:, None].expand_as(shown)
     assert outside.any() and not outside.all()
     torch.testing.assert_close(shown[outside], views[outside], atol=1e-5, rtol=0)
@@ -75,14 +67,16 @@ def test_the_image_follows_albedo_and_exposure_by_hand() -> None:
 
 def test_its_gradient_is_near_that_of_mitsuba() -> None:
     """Biased by the light that the cabinet throws on itself and on the room, and no more."""
-    mitsuba = MitsubaRenderer(tiny_house("lit"), OBJECT, _cameras(), 400, 5)
+    mitsuba = MitsubaRenderer(tiny_house("lit"), OBJECT, cabinet_cameras(*SIZE)[:2], 400, 5)
     ours, full = _gradient(_renderer()), _gradient(mitsuba)
     assert float(torch.cosine_similarity(ours.ravel(), full.ravel(), 0)) > 0.9
     assert 0.8 < float(ours.sum() / full.sum()) < 1.05
 
 
 def test_refreshing_renews_the_light_and_repeats_it() -> None:
-    renderer = FixedIlluminationRenderer(tiny_house("lit"), OBJECT, _cameras(), 4, 3)
+    renderer = FixedIlluminationRenderer(
+        tiny_house("lit"), OBJECT, cabinet_cameras(*SIZE)[:2], 4, 3
+    )
     first, black = renderer(_texture()), torch.zeros(renderer.texture_shape)
     before = renderer.background.clone()
     renderer.refresh(black)
@@ -93,7 +87,8 @@ def test_refreshing_renews_the_light_and_repeats_it() -> None:
 
 def test_two_builds_are_bit_identical() -> None:
     first, second = (
-        FixedIlluminationRenderer(tiny_house("lit"), OBJECT, _cameras(), 4, 3) for _ in range(2)
+        FixedIlluminationRenderer(tiny_house("lit"), OBJECT, cabinet_cameras(*SIZE)[:2], 4, 3)
+        for _ in range(2)
     )
     assert torch.equal(first(_texture()), second(_texture()))
 
@@ -117,4 +112,4 @@ def test_light_below_a_lamp_is_its_irradiance() -> None:
 
 def test_a_baked_house_is_refused() -> None:
     with pytest.raises(InputError, match="kind: expected lit"):
-        FixedIlluminationRenderer(tiny_house(), OBJECT, _cameras())
+        FixedIlluminationRenderer(tiny_house(), OBJECT, cabinet_cameras(*SIZE)[:2])

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from tests import hard_scenes
 from tests.hard_scenes import TARGET, Scene
-from tests.houses import tiny_house
+from tests.houses import cabinet_cameras, tiny_house
 from tests.parity import (
     Render,
     random_texture,
@@ -19,7 +19,6 @@ from tests.parity import (
     rendered_by_twin,
 )
 from tests.ray_twin import Twin
-from vlnhijack.frames import Camera, heading_of
 from vlnhijack.rendering import samples
 from vlnhijack.rendering.coverage import object_coverage
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
@@ -36,19 +35,9 @@ RENDERERS = {"frozen": FrozenRenderer, "mitsuba": MitsubaRenderer}
 both = pytest.mark.parametrize("kind", RENDERERS)
 
 
-def _cameras(width: int = 32, height: int = 24) -> list[Camera]:
-    """Four cameras that look at the cabinet from the viewpoints."""
-    house = tiny_house()
-    centre = np.array(house.object(OBJECT).centre)
-    return [
-        Camera((x, y, z), float(heading_of(centre - (x, y, z))), -0.4, width, height)
-        for x, y, z in house.graph.positions.tolist()
-    ]
-
-
 @cache
 def _renderer(kind: str) -> Render:
-    return RENDERERS[kind](tiny_house(), OBJECT, _cameras(), SPP, SEED)
+    return RENDERERS[kind](tiny_house(), OBJECT, cabinet_cameras(), SPP, SEED)
 
 
 def _white(house: House) -> House:
@@ -66,9 +55,9 @@ def _object_light(render: Render, texture: Tensor) -> Tensor:
 def test_energy_a_white_house_is_white_inside(kind: str) -> None:
     """Every ray from a viewpoint meets the front of a face."""
     house = _white(tiny_house())
-    image = RENDERERS[kind](house, OBJECT, _cameras(), SPP, SEED)(torch.ones(SHAPE))
+    image = RENDERERS[kind](house, OBJECT, cabinet_cameras(), SPP, SEED)(torch.ones(SHAPE))
     torch.testing.assert_close(image, torch.ones_like(image), atol=2e-6, rtol=0)
-    views = render_views(house, _cameras(), SPP, SEED)
+    views = render_views(house, cabinet_cameras(), SPP, SEED)
     torch.testing.assert_close(views, torch.ones_like(views), atol=2e-6, rtol=0)
 
 
@@ -95,7 +84,7 @@ def test_the_object_is_linear_in_its_texture(kind: str) -> None:
 @both
 def test_the_gradient_is_the_adjoint(kind: str) -> None:
     """⟨Ax, y⟩ = ⟨x, Aᵀy⟩ within 1e-6, Mitsuba's at equal rays for both."""
-    texture, cameras = random_texture(SHAPE, 4), _cameras()
+    texture, cameras = random_texture(SHAPE, 4), cabinet_cameras()
     weights = random_texture((len(cameras), 3, 24, 32), 5)
     forward = (_object_light(_renderer(kind), texture) * weights).sum()
     renderer = RENDERERS[kind](tiny_house(), OBJECT, cameras, SPP, SEED)
@@ -127,7 +116,7 @@ def test_tiles_of_views_change_the_samples_alone(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three views in wavefronts of two differ from one wavefront as two seeds do, in any order."""
-    cameras, texture = _cameras(64, 48)[:3], random_texture(SHAPE)
+    cameras, texture = cabinet_cameras(64, 48)[:3], random_texture(SHAPE)
 
     def images(renderer: str, seed: int) -> Tensor:
         return RENDERERS[renderer](tiny_house(), OBJECT, cameras, SPP, seed)(texture)
@@ -144,7 +133,10 @@ def test_tiles_of_views_change_the_samples_alone(
 def test_frozen_repeats_bit_for_bit() -> None:
     """Build, apply and adjoint."""
     first, again, other = (
-        rendered(FrozenRenderer(tiny_house(), OBJECT, _cameras(), SPP, seed), random_texture(SHAPE))
+        rendered(
+            FrozenRenderer(tiny_house(), OBJECT, cabinet_cameras(), SPP, seed),
+            random_texture(SHAPE),
+        )
         for seed in (SEED, SEED, SEED + 1)
     )
     assert all(torch.equal(a, b) for a, b in zip(first, again, strict=True))
@@ -153,7 +145,9 @@ def test_frozen_repeats_bit_for_bit() -> None:
 
 def test_mitsubas_gradients_repeat_within_rounding() -> None:
     first, again = (
-        rendered_by_mitsuba(tiny_house(), OBJECT, _cameras(), SPP, SEED, random_texture(SHAPE))
+        rendered_by_mitsuba(
+            tiny_house(), OBJECT, cabinet_cameras(), SPP, SEED, random_texture(SHAPE)
+        )
         for _ in range(2)
     )
     assert (first.gradient - again.gradient).norm() <= 1e-5 * first.gradient.norm()
@@ -174,7 +168,7 @@ def test_the_operators_gradient_is_that_of_its_float64_twin(scene: Scene) -> Non
 
 
 def test_baked_mitsuba_gradients_are_central_differences() -> None:
-    renderer = MitsubaRenderer(tiny_house(), OBJECT, _cameras(), SPP, SEED)
+    renderer = MitsubaRenderer(tiny_house(), OBJECT, cabinet_cameras(), SPP, SEED)
     texture, step = random_texture(SHAPE), 0.1 * random_texture(SHAPE, 1)
     weights = torch.linspace(0, 1, 32)
 
@@ -195,7 +189,7 @@ def test_lit_mitsuba_gradients_are_central_differences() -> None:
     An exposure on the straight part of the display curve keeps both estimates free of bias.
     """
     house = replace(tiny_house("lit"), exposure=2e-4)
-    renderer = MitsubaRenderer(house, OBJECT, _cameras(16, 12), 36, max_depth=3)
+    renderer = MitsubaRenderer(house, OBJECT, cabinet_cameras(16, 12), 36, max_depth=3)
     texture, step, pairs = 0.1 + 0.8 * random_texture(SHAPE), 0.02, []
     for seed in range(8):
         renderer.seed, renderer.gradient_seed = 100 + seed, 200 + seed
@@ -214,7 +208,7 @@ def test_lit_mitsuba_gradients_are_central_differences() -> None:
 @both
 def test_memory_does_not_grow(kind: str) -> None:
     """Resident memory over 2,000 forward and backward passes at 64×48, after a warm-up."""
-    renderer = RENDERERS[kind](tiny_house(), OBJECT, _cameras(64, 48)[:1], SPP, SEED)
+    renderer = RENDERERS[kind](tiny_house(), OBJECT, cabinet_cameras(64, 48)[:1], SPP, SEED)
     texture = random_texture(SHAPE).requires_grad_()
 
     def iterate(times: int) -> float:

@@ -8,9 +8,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from tests.houses import tiny_house
+from tests.houses import cabinet_cameras, tiny_house
 from vlnhijack.errors import InputError
-from vlnhijack.frames import Camera, heading_of
+from vlnhijack.frames import Camera
 from vlnhijack.rendering.frozen_renderer import FrozenRenderer
 from vlnhijack.rendering.mitsuba_renderer import MitsubaRenderer
 from vlnhijack.rendering.observe import render_views
@@ -22,19 +22,9 @@ SPP = 16
 RENDERERS = {"frozen": FrozenRenderer, "mitsuba": MitsubaRenderer}
 
 
-def _cameras(width: int = 64, height: int = 48) -> list[Camera]:
-    """Four cameras that look at the cabinet from the viewpoints."""
-    house = tiny_house()
-    centre = np.array(house.object(OBJECT).centre)
-    return [
-        Camera((x, y, z), float(heading_of(centre - (x, y, z))), -0.4, width, height)
-        for x, y, z in house.graph.positions.tolist()
-    ]
-
-
 @cache
 def _renderer(kind: str, seed: int = 7) -> Renderer:
-    return RENDERERS[kind](tiny_house(), OBJECT, _cameras(), SPP, seed)
+    return RENDERERS[kind](tiny_house(), OBJECT, cabinet_cameras(64, 48), SPP, seed)
 
 
 def _texture(seed: int = 0) -> Tensor:
@@ -55,7 +45,7 @@ def _cosine(a: Tensor, b: Tensor) -> float:
 
 
 def _mitsuba_gradient(gradient_seed: int) -> Tensor:
-    renderer = MitsubaRenderer(tiny_house(), OBJECT, _cameras(), SPP, 12345)
+    renderer = MitsubaRenderer(tiny_house(), OBJECT, cabinet_cameras(64, 48), SPP, 12345)
     renderer.gradient_seed = gradient_seed
     return _gradient(renderer)
 
@@ -81,7 +71,7 @@ def test_a_texture_of_another_shape_is_refused(kind: str) -> None:
 def test_images_equal_the_views_of_a_house_with_that_texture(kind: str) -> None:
     """At the same samples; so an attack sees what an evaluation of the same rays sees."""
     house = tiny_house().with_texture(OBJECT, _texture().numpy())
-    views = render_views(house, _cameras(), SPP, 7)
+    views = render_views(house, cabinet_cameras(64, 48), SPP, 7)
     assert float((_renderer(kind)(_texture()) - views).abs().max()) <= 1e-5
 
 
@@ -120,11 +110,11 @@ def test_other_samples_differ_no_more_than_two_mitsuba_seeds_do() -> None:
 
 def test_frozen_refuses_lit_houses() -> None:
     with pytest.raises(InputError, match="kind: expected baked"):
-        FrozenRenderer(tiny_house("lit"), OBJECT, _cameras())
+        FrozenRenderer(tiny_house("lit"), OBJECT, cabinet_cameras(64, 48))
 
 
 def test_a_lit_house_gives_gradients_through_light_and_display() -> None:
-    house, cameras = tiny_house("lit"), _cameras(32, 24)[:2]
+    house, cameras = tiny_house("lit"), cabinet_cameras(32, 24)[:2]
     renderer = MitsubaRenderer(house, OBJECT, cameras, 64, 5, max_depth=3)
     texture = torch.full(renderer.texture_shape, 0.5, requires_grad=True)
     before = renderer(texture).mean()
@@ -136,7 +126,7 @@ def test_a_lit_house_gives_gradients_through_light_and_display() -> None:
 
 
 def test_a_lit_house_is_shown_as_it_is_rendered() -> None:
-    house, cameras = tiny_house("lit"), _cameras(32, 24)[:2]
+    house, cameras = tiny_house("lit"), cabinet_cameras(32, 24)[:2]
     renderer = MitsubaRenderer(house, OBJECT, cameras, 144, 5)
     image = renderer(torch.from_numpy(house.surface(OBJECT).texture))
     views = render_views(house, cameras, 144, 6)

@@ -25,13 +25,8 @@ def mesh(
     connectivity: Annotated[
         Path | None, typer.Option(help="Folder of <name>_connectivity.json; else one is made.")
     ] = None,
-    unwrap: Annotated[
-        Literal["attacked", "all"],
-        typer.Option(help="When objects get textures of their own: when attacked, or all now."),
-    ] = "attacked",
-    allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Flat colours for missing or broken images.")
-    ] = False,
+    unwrap: house_scan.Unwrap = "attacked",
+    allow_missing: house_scan.AllowMissing = False,
     seed: Annotated[int, typer.Option(help="Of the graph and the episodes.")] = 0,
 ) -> None:
     """Make a house of a glTF, OBJ or PLY file."""

@@ -10,19 +10,21 @@ from vlnhijack.cli.console import console, progress_bars
 Connectivity = Annotated[
     Path, typer.Option(help="Folder or archive (.tar.gz) of <scan>_connectivity.json.")
 ]
+Unwrap = Annotated[
+    Literal["attacked", "all"],
+    typer.Option(help="When objects get textures of their own: when attacked, or all now."),
+]
+AllowMissing = Annotated[
+    bool, typer.Option("--allow-missing", help="Flat colours for missing or broken images.")
+]
 
 
 def mp3d(
     scan: Annotated[Path, typer.Argument(help="Folder of a scan, its parts plain or zipped.")],
     connectivity: Connectivity,
     out: Annotated[Path | None, typer.Option(help="Folder; scenes/<scan> by default.")] = None,
-    unwrap: Annotated[
-        Literal["attacked", "all"],
-        typer.Option(help="When objects get textures of their own: when attacked, or all now."),
-    ] = "attacked",
-    allow_missing: Annotated[
-        bool, typer.Option("--allow-missing", help="Flat colours for missing or broken images.")
-    ] = False,
+    unwrap: Unwrap = "attacked",
+    allow_missing: AllowMissing = False,
     seed: Annotated[int, typer.Option(help="Of the episodes.")] = 0,
 ) -> None:
     """Make a house of a Matterport3D scan."""

@@ -44,6 +44,9 @@ def _curves(axes: Axes, rows: Rows, error: Any, label: str) -> None:
             )
     axes.set(xscale="log", yscale="log", ylabel=label)
     axes.set_xlabel("image with gradient, ms")
+    low, high = axes.get_ylim()
+    if high < 10 * low:
+        axes.set_ylim(low / 3, 3 * high)
     axes.grid(color="#EEEEEE")
 
 
